@@ -105,7 +105,7 @@ test-qgis: check ## the algorithms in an installed QGIS, without a window (not p
 	qgis/tests/run_qgis.sh target/debug/skysweep
 
 readme: check ## bring the numbers of benches/results into README.md and docs
-	@SKYSWEEP_WRITE_NUMBERS=1 cargo test --quiet --test readme_numbers
+	@SKYSWEEP_WRITE_NUMBERS=1 cargo test --quiet --test documents numbers
 
 stubs: check ## write the Python functions of the jobs anew, of the configurations
 	@SKYSWEEP_WRITE_STUBS=1 cargo test --quiet -p skysweep-python --test signatures the_functions

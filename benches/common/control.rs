@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use crate::town::{self, Frame, Look};
+use super::town::{self, Frame, Look};
 
 /// Places of the points, as shares of the sides of the area.
 const PLACES: [[f64; 2]; 5] = [[0.15, 0.18], [0.84, 0.12], [0.47, 0.55], [0.2, 0.86], [0.8, 0.83]];

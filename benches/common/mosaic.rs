@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use anyhow::ensure;
 use io::raster::{Band, BandData, write_image_with_rpc};
 
-use crate::town::{self, Frame, Look};
+use super::town::{self, Frame, Look};
 
 /// Renders the tile of a view.
 pub(crate) fn tile(folder: &Path, name: &str, look: &Look) -> anyhow::Result<PathBuf> {

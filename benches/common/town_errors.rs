@@ -6,7 +6,7 @@ use anyhow::Context;
 use io::raster::{ImageSource, read_dem_window};
 use raster::Window;
 
-use crate::town;
+use super::town;
 
 /// Calls `one` with each n-th cell of each n-th row and its error, metres (NaN for a void), at
 /// least 40 m inside an area of `area_m` metres to the east and to the south.

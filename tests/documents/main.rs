@@ -2,5 +2,7 @@
 
 mod examples;
 mod help_pages;
+mod links;
+mod numbers;
 mod pages;
 mod qgis_plugin;

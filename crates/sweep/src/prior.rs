@@ -11,7 +11,7 @@ use crate::ranges::Ranges;
 
 /// Reduction of the cost at the prior's height, a tenth of [`crate::cost::COST_MAX`]. Where the
 /// image has texture it still decides: a building in the prior that does not exist leaves no trace
-/// (`tests/dsm_prior.rs`).
+/// (`tests/dsm/prior.rs`).
 const FAVOUR: f32 = 11.0;
 /// Smallest deviation of the prior, in steps of the search. A step is half a pixel of parallax.
 const STEPS: f64 = 2.0;

@@ -19,13 +19,13 @@ use super::scene::SurfaceOfRun;
 use crate::job_file::read_dsm_job;
 use job::files::{self, FileError};
 use job::guarded;
-use surfaces::classes::{self, ClassesConfig};
-use surfaces::dtm::{self, DtmConfig, DtmReport};
-use surfaces::ortho::{self, OrthoConfig};
 use job::output_folder::OutputFolder;
 use job::report_page;
 use job::run_links;
 use job::threads;
+use surfaces::classes::{self, ClassesConfig};
+use surfaces::dtm::{self, DtmConfig, DtmReport};
+use surfaces::ortho::{self, OrthoConfig};
 
 /// Names in the folder of the products.
 const ORTHO: &str = "ortho.tif";

@@ -18,13 +18,13 @@ use crate::error::DsmError;
 use crate::planning::grid::DsmGrid;
 use crate::products::remove_products;
 use crate::report::{DsmReport, ImageReport};
-use job::run_links;
 use crate::stac::{AssetKind, StacAsset, StacRasters, item_and_collection};
 use crate::writing::page;
 use crate::writing::pictures::{Layer, ReadLayer, RunMaps, write_pictures};
 use job::files::{FileError, create_folder, write_json};
 use job::job_paths::relative;
 use job::output_folder::OutputFolder;
+use job::run_links;
 use surfaces::eval::remove_evaluation;
 use surfaces::surface_layer::VOID;
 

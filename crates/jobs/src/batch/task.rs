@@ -8,21 +8,21 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
 
+use dsm::production::{PLAN, POINTING, make_or_resume};
+use dsm::products::ProductsConfig;
+use dsm::{DsmConfig, FILES, LayerArea, MapBounds, USED_CONFIG};
+use job::error_text::with_causes;
+use job::job_file::{JobFileError, defect};
+use job::job_paths::resolved;
+use job::path_variables::expanded;
+use scenes::priors::PriorsConfig;
 use surfaces::camera_stand::{StandConfig, StandSource};
 use surfaces::classes::ClassesConfig;
 use surfaces::diff::DiffConfig;
-use dsm::{DsmConfig, FILES, LayerArea, MapBounds, USED_CONFIG};
 use surfaces::dtm::DtmConfig;
-use job::error_text::with_causes;
 use surfaces::eval::{EvalTarget, GridEvalConfig};
 use surfaces::heightmap::HeightMapConfig;
-use job::job_file::{JobFileError, defect};
-use job::job_paths::resolved;
 use surfaces::ortho::OrthoConfig;
-use job::path_variables::expanded;
-use scenes::priors::PriorsConfig;
-use dsm::production::{PLAN, POINTING, make_or_resume};
-use dsm::products::ProductsConfig;
 
 /// What a batch can make of a scene, in the order in which it is made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]

@@ -6,8 +6,8 @@ use raster::Grid;
 use serde::Serialize;
 
 use super::error::ClassesError;
-use job::files::FileError;
 use crate::surface_layer::{self, NO_LAYERS};
+use job::files::FileError;
 
 /// Probability below which a height is rather wrong than right.
 const LEAST_CONFIDENCE: f32 = 0.5;

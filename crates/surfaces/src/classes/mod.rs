@@ -24,6 +24,6 @@ pub use error::ClassesError;
 pub use layers::ClassLayers;
 pub use multispectral::IndexImage;
 pub use report::ClassesReport;
-pub use run::run;
-pub use run::legend;
 pub use run::FILES;
+pub use run::legend;
+pub use run::run;

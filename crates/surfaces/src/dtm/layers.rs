@@ -8,8 +8,8 @@ use raster::Grid;
 use serde::Serialize;
 
 use super::error::DtmError;
-use job::files::FileError;
 use crate::surface_layer::{self, NO_LAYERS};
+use job::files::FileError;
 
 /// Probability below which a cell is no evidence. Of such cells of two simulated scenes (hills and
 /// random:9601), one in twenty showed the ground, and two in five lay metres below it.

@@ -3,7 +3,7 @@
 
 use serde_json::Value;
 
-use crate::results::{Results, Row, median, number};
+use super::results::{Results, Row, median, number};
 
 /// Views of JAX_068, the scene's name in `scenes.json`, and how a page names it.
 const JAX: [(&[u64], &str, &str); 6] = [

@@ -6,12 +6,11 @@
 //! looks like a measurement.
 
 mod blocks;
-mod pages;
 mod results;
 
 use std::fs;
 
-use pages::{pages, prose, root, text};
+use crate::pages::{pages, prose, root, text};
 use results::Results;
 
 const END: &str = "<!-- end -->";
@@ -100,8 +99,8 @@ fn no_measurement_stands_outside_of_a_block() {
     }
     assert!(
         stray.is_empty(),
-        "make these numbers in tests/readme_numbers/blocks.rs, or name them as parameters in \
-         tests/readme_numbers/main.rs:\n{}",
+        "make these numbers in tests/documents/numbers/blocks.rs, or name them as parameters in \
+         tests/documents/numbers.rs:\n{}",
         stray.join("\n")
     );
 }
