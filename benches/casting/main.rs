@@ -51,7 +51,7 @@ fn main() -> anyhow::Result<()> {
 
 fn time(city: &Path) -> anyhow::Result<Value> {
     let mut clock = Clock::default();
-    let file = clock.time(|| io::citymodel::read(&city.join("3dbag_5910.city.json")))?;
+    let file = clock.time(|| cityfiles::read(&city.join("3dbag_5910.city.json")))?;
     clock.time(|| TriangleMesh::from_model(&file.model, &MeshConfig::default()))?;
     drop(file);
     let load = clock.json();
@@ -124,7 +124,7 @@ fn targets(scene: &Scene, view: &View) -> Vec<Target> {
 
 /// Makes a model whose objects are all buildings.
 fn arranged(path: &Path) -> anyhow::Result<PriorModel> {
-    let model = io::citymodel::read(path)?.model;
+    let model = cityfiles::read(path)?.model;
     let meshed = TriangleMesh::from_model(&model, &MeshConfig::default())?;
     Ok(PriorModel::new(meshed.mesh, &vec![true; model.objects.len()])?)
 }

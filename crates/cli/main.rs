@@ -4,45 +4,25 @@
 //! Results go to standard output; log lines and errors go to standard error. Exit codes: 0
 //! complete, 1 finished with failed parts or below a requested threshold, 2 bad input or I/O error.
 
-mod align;
-mod batch;
-mod buildings;
-mod city;
-mod classes;
-mod completions;
+mod commands;
 mod corrections;
-mod diff;
-mod dsm;
-mod dtm;
 mod error;
-mod eval;
 mod global;
-mod groundview;
-mod heightmap;
 mod interrupt;
 mod log;
-mod mesh;
 mod options;
-mod ortho;
 mod print;
-mod priors;
-mod production;
-mod products;
 mod progress;
-mod register;
-mod rpc;
-mod simulate;
-mod splats;
-mod split;
 mod stand;
-mod tiles;
-mod train;
-mod view;
 
 use std::process::ExitCode;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
+use crate::commands::{
+    align, batch, buildings, city, classes, completions, diff, dsm, dtm, eval, groundview, heightmap, mesh, ortho,
+    priors, production, products, register, rpc, simulate, splats, split, tiles, train, view,
+};
 use crate::global::{Global, Outcome};
 
 /// Satellite surface models from RPC images.

@@ -35,7 +35,8 @@
 //! - Methods: [`sweep`] (the height sweep), [`eval`], [`priors`], [`heightmap`], [`groundview`],
 //!   [`ortho`], [`splats`], [`terrain`], [`train`], [`tsdf`], [`change`],
 //!   [`classes`], [`buildings`], [`simulate`].
-//! - Files: [`io`] reads and writes every format, [`report`] makes pictures and pages.
+//! - Files: [`io`] reads and writes rasters, cameras, points and splats, [`cityfiles`] city models and meshes,
+//!   and [`report`] makes pictures and pages.
 //! - [`numeric`] has progress and cancellation, seeded random numbers and order statistics.
 //!
 //! # Example
@@ -56,6 +57,7 @@ pub use bvh;
 pub use camera;
 pub use change;
 pub use city;
+pub use cityfiles;
 pub use classes;
 pub use colmap;
 pub use crs;

@@ -17,7 +17,7 @@ use cargo_metadata::{Metadata, MetadataCommand, Package};
 
 /// The floor of every crate, those to come included, so that a new crate lands where the design has
 /// it.
-const FLOORS: [(&str, u8); 30] = [
+const FLOORS: [(&str, u8); 36] = [
     ("skysweep-numeric", 0),
     ("skysweep-testing", 0),
     ("skysweep-geodesy", 1),
@@ -44,10 +44,16 @@ const FLOORS: [(&str, u8); 30] = [
     ("skysweep-tsdf", 4),
     ("skysweep-train", 5),
     ("skysweep-io", 5),
+    ("skysweep-cityfiles", 6),
     ("skysweep-report", 6),
-    ("skysweep-jobs", 7),
-    ("skysweep", 8),
-    ("skysweep-python", 8),
+    ("skysweep-job", 7),
+    ("skysweep-surfaces", 8),
+    ("skysweep-dsm", 9),
+    ("skysweep-scenes", 10),
+    ("skysweep-viewer", 10),
+    ("skysweep-jobs", 11),
+    ("skysweep", 12),
+    ("skysweep-python", 12),
 ];
 
 /// Foreign packages that only one crate may use: (package, its home).
@@ -55,7 +61,13 @@ const HOMES: [(&str, &str); 4] =
     [("gdal", "skysweep-io"), ("gdal-sys", "skysweep-io"), ("proj", "skysweep-crs"), ("proj-sys", "skysweep-crs")];
 
 /// Folders under `crates/` whose sources may touch the file system.
-const FILE_CRATES: [&str; 3] = ["io", "jobs", "cli"];
+const FILE_CRATES: [&str; 9] = ["io", "cityfiles", "job", "surfaces", "dsm", "scenes", "viewer", "jobs", "cli"];
+
+/// Most sources of a folder, so that its list is read at one look.
+const FOLDER_FILES: usize = 25;
+
+/// Most lines of a crate, tests included.
+const CRATE_LINES: usize = 20_000;
 
 fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
@@ -77,7 +89,7 @@ fn broken_arrow(floors: &BTreeMap<&str, u8>, from: &str, to: &str) -> Option<Str
     }
     Some(format!(
         "{from} (floor {above}) depends on {to} (floor {below}): an arrow goes only to a lower floor; \
-         move the shared type down, or do the joining in jobs"
+         move the shared type down, or do the joining in a job"
     ))
 }
 
@@ -143,7 +155,7 @@ fn dependencies_go_only_to_lower_floors() {
     let mut broken = Vec::new();
     for package in metadata().workspace_packages() {
         if !floors.contains_key(package.name.as_str()) {
-            broken.push(format!("{}: give the new crate a floor in tests/architecture.rs", package.name));
+            broken.push(format!("{}: give the new crate a floor in tests/architecture/main.rs", package.name));
         }
         broken.extend(package.dependencies.iter().filter_map(|d| broken_arrow(&floors, &package.name, &d.name)));
     }
@@ -198,9 +210,30 @@ fn files_are_touched_only_where_files_live() {
         .filter(|path| path.starts_with(root().join("crates")) && !may(path))
         .filter(|path| !is_test_source(path.strip_prefix(root()).unwrap_or(path)))
         .filter(|path| names_std_fs(&fs::read_to_string(path).expect("a source is readable")))
-        .map(|path| format!("{}: std::fs is for io, jobs and cli; take bytes or a grid instead", path.display()))
+        .map(|path| format!("{}: std::fs is for {FILE_CRATES:?}; take bytes or a grid instead", path.display()))
         .collect();
     report(&broken);
+}
+
+#[test]
+fn folders_and_crates_stay_small() {
+    let mut folders: BTreeMap<PathBuf, usize> = BTreeMap::new();
+    let mut crates: BTreeMap<PathBuf, usize> = BTreeMap::new();
+    for path in all_sources() {
+        *folders.entry(path.parent().expect("a folder").to_owned()).or_default() += 1;
+        let Ok(in_crates) = path.strip_prefix(root().join("crates")) else { continue };
+        let of = crates.entry(in_crates.iter().take(1).collect()).or_default();
+        *of += fs::read_to_string(&path).expect("a source is readable").lines().count();
+    }
+    let full = folders
+        .iter()
+        .filter(|(_, files)| **files > FOLDER_FILES)
+        .map(|(folder, files)| format!("{}: {files} files, at most {FOLDER_FILES}: make folders", folder.display()));
+    let large = crates
+        .iter()
+        .filter(|(_, lines)| **lines > CRATE_LINES)
+        .map(|(name, lines)| format!("crates/{}: {lines} lines, at most {CRATE_LINES}: split it", name.display()));
+    report(&full.chain(large).collect::<Vec<_>>());
 }
 
 /// Sources of the crates, without tests, benches and examples.

@@ -5,8 +5,8 @@ use std::path::Path;
 
 use camera::{ImagePoint, Rpc, RpcCamera};
 use city::{MeshConfig, TriangleMesh, check_solids};
+use cityfiles::{CityJsonOptions, MeshFormat};
 use geodesy::{LonLatHeight, MapPoint};
-use io::citymodel::{CityJsonOptions, MeshFormat};
 use io::points::{CellLattice, PointCloud};
 use io::raster::ImageSource;
 use io::rpc::RpcFormat;
@@ -78,7 +78,7 @@ pub(crate) fn call(reader: Reader, path: &Path) -> Outcome {
         Reader::Image => image(path),
         Reader::Dem => whether(io::raster::read_dem(path)),
         Reader::City => city_model(path, folder),
-        Reader::Surface => whether(io::surfaces::read(path, &MeshConfig::default())),
+        Reader::Surface => whether(cityfiles::surfaces::read(path, &MeshConfig::default())),
         Reader::Cloud => {
             let anchor = MapPoint { x: 0.0, y: 0.0 };
             let cloud = PointCloud::open(path)?;
@@ -141,16 +141,16 @@ fn image(path: &Path) -> Outcome {
 }
 
 fn city_model(path: &Path, folder: &Path) -> Outcome {
-    let file = io::citymodel::read(path)?;
+    let file = cityfiles::read(path)?;
     let config = MeshConfig::default();
     let meshed = TriangleMesh::from_model(&file.model, &config)?;
     check_solids(&file.model, &config)?;
     for (format, name) in [(MeshFormat::Obj, "o.obj"), (MeshFormat::Ply, "o.ply"), (MeshFormat::Glb, "o.glb")] {
-        let _ = io::citymodel::write_mesh(&folder.join(name), &file.model, &meshed.mesh, format, true);
+        let _ = cityfiles::write_mesh(&folder.join(name), &file.model, &meshed.mesh, format, true);
     }
-    let _ = io::citymodel::write_footprints(&folder.join("o.geojson"), &file.model, &meshed.objects, true);
+    let _ = cityfiles::write_footprints(&folder.join("o.geojson"), &file.model, &meshed.objects, true);
     let options = CityJsonOptions { overwrite: true, ..CityJsonOptions::default() };
-    let _ = io::citymodel::write_cityjson(&folder.join("o.city.json"), &file.model, &options);
+    let _ = cityfiles::write_cityjson(&folder.join("o.city.json"), &file.model, &options);
     Ok(())
 }
 

@@ -55,7 +55,8 @@ pub enum SaveError {
 }
 
 impl SaveError {
-    pub(crate) fn unwritable(path: &Path, reason: impl ToString) -> Self {
+    /// Returns the error of an output at `path` that cannot be written, with the reason as a text.
+    pub fn unwritable(path: &Path, reason: impl ToString) -> Self {
         Self::Unwritable { path: path.to_owned(), reason: reason.to_string() }
     }
 

@@ -11,8 +11,8 @@ const ARRAY_BUFFER: u32 = 34962;
 const ELEMENT_ARRAY_BUFFER: u32 = 34963;
 
 /// The accessors of a document and the binary chunk behind them.
-#[derive(Default)]
-pub(crate) struct GlbBuffers {
+#[derive(Debug, Default)]
+pub struct GlbBuffers {
     accessors: Vec<Value>,
     views: Vec<Value>,
     binary: Vec<u8>,
@@ -20,7 +20,7 @@ pub(crate) struct GlbBuffers {
 
 impl GlbBuffers {
     /// Adds positions and returns the index of their accessor.
-    pub(crate) fn positions(&mut self, positions: &[[f32; 3]]) -> usize {
+    pub fn positions(&mut self, positions: &[[f32; 3]]) -> usize {
         let bound = |pick: fn(f32, f32) -> f32, start: f32| -> [f32; 3] {
             [0, 1, 2].map(|axis| positions.iter().fold(start, |bound, p| pick(bound, p[axis])))
         };
@@ -34,7 +34,7 @@ impl GlbBuffers {
     }
 
     /// Adds positions in a texture and returns the index of their accessor.
-    pub(crate) fn texture_positions(&mut self, positions: &[[f32; 2]]) -> usize {
+    pub fn texture_positions(&mut self, positions: &[[f32; 2]]) -> usize {
         let bytes = positions.as_flattened().iter().flat_map(|c| c.to_le_bytes());
         let view = self.view(bytes, Some(ARRAY_BUFFER));
         self.accessor(json!({
@@ -43,7 +43,7 @@ impl GlbBuffers {
     }
 
     /// Adds linear colours, 0 to 1, and returns the index of their accessor.
-    pub(crate) fn colours(&mut self, colours: &[[f32; 3]]) -> usize {
+    pub fn colours(&mut self, colours: &[[f32; 3]]) -> usize {
         let bytes = colours.as_flattened().iter().flat_map(|c| c.to_le_bytes());
         let view = self.view(bytes, Some(ARRAY_BUFFER));
         self.accessor(json!({
@@ -52,7 +52,7 @@ impl GlbBuffers {
     }
 
     /// Adds colours with opacities as bytes, four of each, and returns the index of their accessor.
-    pub(crate) fn byte_colours(&mut self, bytes: Vec<u8>) -> usize {
+    pub fn byte_colours(&mut self, bytes: Vec<u8>) -> usize {
         let count = bytes.len() / 4;
         let view = self.view(bytes.into_iter(), Some(ARRAY_BUFFER));
         self.accessor(json!({
@@ -61,13 +61,13 @@ impl GlbBuffers {
     }
 
     /// Adds `count` scalars or vectors, such as `VEC4`, and returns the index of their accessor.
-    pub(crate) fn numbers(&mut self, kind: &'static str, count: usize, numbers: &[f32]) -> usize {
+    pub fn numbers(&mut self, kind: &'static str, count: usize, numbers: &[f32]) -> usize {
         let view = self.view(numbers.iter().flat_map(|n| n.to_le_bytes()), Some(ARRAY_BUFFER));
         self.accessor(json!({ "bufferView": view, "componentType": FLOAT, "count": count, "type": kind }))
     }
 
     /// Adds corners and returns the index of their accessor.
-    pub(crate) fn indices(&mut self, indices: &[u32]) -> usize {
+    pub fn indices(&mut self, indices: &[u32]) -> usize {
         let view = self.view(indices.iter().flat_map(|i| i.to_le_bytes()), Some(ELEMENT_ARRAY_BUFFER));
         self.accessor(json!({
             "bufferView": view, "componentType": UNSIGNED_INT, "count": indices.len(), "type": "SCALAR",
@@ -75,7 +75,7 @@ impl GlbBuffers {
     }
 
     /// Adds the bytes of a picture and returns the index of their buffer view.
-    pub(crate) fn picture(&mut self, bytes: Vec<u8>) -> usize {
+    pub fn picture(&mut self, bytes: Vec<u8>) -> usize {
         self.view(bytes.into_iter(), None)
     }
 
@@ -100,7 +100,8 @@ impl GlbBuffers {
 }
 
 /// The two chunks of a GLB file.
-pub(crate) struct Glb {
+#[derive(Debug)]
+pub struct Glb {
     json: Vec<u8>,
     binary: Vec<u8>,
 }
@@ -110,7 +111,7 @@ impl Glb {
     ///
     /// # Errors
     /// A text for a file that is too large for the format.
-    pub(crate) fn new(mut document: Value, buffers: GlbBuffers) -> Result<Self, String> {
+    pub fn new(mut document: Value, buffers: GlbBuffers) -> Result<Self, String> {
         // glTF does not allow empty lists.
         if !buffers.accessors.is_empty() {
             document["accessors"] = Value::Array(buffers.accessors);
@@ -128,7 +129,10 @@ impl Glb {
     }
 
     /// Writes the header and both chunks.
-    pub(crate) fn write(&self, out: &mut dyn Write) -> std::io::Result<()> {
+    ///
+    /// # Errors
+    /// The error of the writer.
+    pub fn write(&self, out: &mut dyn Write) -> std::io::Result<()> {
         let Self { json, binary } = self;
         let mut put = |number: usize| out.write_all(&(number as u32).to_le_bytes());
         let binary_chunk = if binary.is_empty() { 0 } else { 8 + binary.len() };

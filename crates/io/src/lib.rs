@@ -8,13 +8,12 @@
 pub mod areas;
 pub mod atomic;
 pub mod camera_file;
-pub mod citymodel;
 pub mod colmap;
 pub mod coloured_mesh;
 pub mod control;
-mod gltf;
+pub mod gltf;
 pub mod ground_points;
-mod lines;
+pub mod lines;
 pub mod maps;
 pub mod npy;
 pub mod ply;
@@ -27,10 +26,9 @@ pub mod similarity;
 pub mod splat_files;
 pub mod splat_ply;
 pub mod stac;
-pub mod surfaces;
 pub mod textured_mesh;
 pub mod transforms;
 pub mod vectors;
 
 pub use atomic::{SaveError, write_bytes};
-pub use regular::{read_regular, read_regular_text};
+pub use regular::{open as open_regular, read_regular, read_regular_text};

@@ -1,7 +1,8 @@
 //! Line numbers of a text that is read from front to back.
 
 /// Finds the line of growing byte positions in one pass over the text.
-pub(crate) struct Lines<'a> {
+#[derive(Debug)]
+pub struct Lines<'a> {
     text: &'a str,
     position: usize,
     line: usize,
@@ -9,13 +10,13 @@ pub(crate) struct Lines<'a> {
 
 impl<'a> Lines<'a> {
     /// Starts at the beginning of a text.
-    pub(crate) fn new(text: &'a str) -> Self {
+    pub fn new(text: &'a str) -> Self {
         Self { text, position: 0, line: 1 }
     }
 
     /// Returns the line, from 1, of the byte at `position`. A position before an earlier one gets
     /// the line of the earlier one.
-    pub(crate) fn at(&mut self, position: u64) -> usize {
+    pub fn at(&mut self, position: u64) -> usize {
         let position = usize::try_from(position).unwrap_or(usize::MAX).min(self.text.len());
         let passed = self.text.as_bytes().get(self.position..position).unwrap_or_default();
         self.line += passed.iter().filter(|byte| **byte == b'\n').count();

@@ -9,7 +9,7 @@ use std::path::Path;
 ///
 /// # Errors
 /// The error of the system; [`ErrorKind::InvalidInput`] for a folder, a pipe or a device.
-pub(crate) fn open(path: &Path) -> Result<File, Error> {
+pub fn open(path: &Path) -> Result<File, Error> {
     // The type is checked first because opening a pipe would block.
     if !std::fs::metadata(path)?.is_file() {
         return Err(Error::new(ErrorKind::InvalidInput, "not a regular file"));
@@ -71,9 +71,8 @@ mod tests {
         assert!(crate::splat_ply::read(zero).is_err());
         assert!(crate::splat_files::read(zero).is_err());
         assert!(crate::transforms::read(zero, None).is_err());
-        assert!(crate::citymodel::read(zero).is_err());
         assert!(crate::points::PointCloud::open(zero).is_err());
         assert!(crate::rpc::read_for_image(zero).is_err());
-        assert!(!crate::maps::is_npy(zero) && !crate::surfaces::is_surface(zero));
+        assert!(!crate::maps::is_npy(zero));
     }
 }

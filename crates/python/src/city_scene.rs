@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use bvh::{Bvh, MISS, Ray};
 use city::{Lod, LodChoice, MeshConfig, MeshSurface, ModelPoint, Scope, SurfaceClass, TriangleMesh};
-use io::citymodel::CityFile;
+use cityfiles::CityFile;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
 use rayon::prelude::*;
@@ -24,7 +24,7 @@ pub(crate) struct CityCore {
 
 fn opened(path: &Path, lod: Option<&str>, all_objects: bool) -> Result<CityCore, Fault> {
     let lod: Option<Lod> = lod.map(|text| text.parse().map_err(|e| Fault::input(&e))).transpose()?;
-    let CityFile { model, .. } = io::citymodel::read(path)?;
+    let CityFile { model, .. } = cityfiles::read(path)?;
     let config = MeshConfig {
         lod: lod.map_or_else(LodChoice::default, LodChoice::Only),
         scope: if all_objects { Scope::Everything } else { Scope::Buildings },

@@ -330,7 +330,7 @@ judged_alike! {
     RpcError => Input,
     FitError => Input,
     city::ModelError => Input,
-    io::citymodel::CityError => File,
+    cityfiles::CityError => File,
     bvh::BvhError => Input,
     eval::EvalError => Input,
 }

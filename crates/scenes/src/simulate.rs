@@ -15,8 +15,8 @@ use ::simulate::{
     SimulationConfig, SpectralBand,
 };
 use camera::{LensError, Pose};
+use cityfiles::{CityJsonOptions, write_cityjson};
 use crs::Crs;
-use io::citymodel::{CityJsonOptions, write_cityjson};
 use io::colmap::{self, ColmapEncoding, ColmapModel, ColmapObservation, ColmapPoint, ColmapView};
 use io::ply::{PlyPoint, write_points};
 use io::raster::{

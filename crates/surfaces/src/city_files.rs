@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use city::{CrsReference, MeshConfig, ModelError, TriangleMesh};
-use io::citymodel::CityError;
+use cityfiles::CityError;
 
 /// A city model that cannot serve as surface.
 #[derive(Debug, thiserror::Error)]
@@ -41,7 +41,7 @@ pub(crate) fn read_triangles(
     path: &Path,
     selection: &MeshConfig,
 ) -> Result<(TriangleMesh, CrsReference), CitySurfaceError> {
-    let model = io::citymodel::read(path)?.model;
+    let model = cityfiles::read(path)?.model;
     let mesh = TriangleMesh::from_model(&model, selection)?.mesh;
     if mesh.triangles.is_empty() {
         return Err(CitySurfaceError::NoSurface { path: path.to_owned() });

@@ -49,7 +49,7 @@ fn prior_depths_become_the_buildings_again() {
     let mean = report["comparison"]["result"]["accuracy"]["mean_m"].as_f64().unwrap();
     assert!(mean < 0.25, "{mean} m from the mesh to the model");
     assert!(out.path().join("town.report.html").is_file());
-    let surface = io::surfaces::read(&path, &city::MeshConfig::default()).unwrap();
+    let surface = cityfiles::surfaces::read(&path, &city::MeshConfig::default()).unwrap();
     assert_eq!(surface.triangles.len() as u64, report["triangles"].as_u64().unwrap());
     // The same mesh in any number of threads, and as glTF.
     let again = out.path().join("again.ply");

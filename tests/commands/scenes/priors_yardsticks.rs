@@ -48,7 +48,7 @@ impl Scene {
 
     fn of(name: &str, offset: ModelPoint) -> Option<Self> {
         let city = city()?;
-        Some(Self::with(&city, &io::citymodel::read(&city.join(name)).unwrap().model, offset))
+        Some(Self::with(&city, &cityfiles::read(&city.join(name)).unwrap().model, offset))
     }
 
     /// With a model, whose coordinates are by `offset` from those of the reference.
@@ -159,7 +159,7 @@ const FALSE_ROOF_HITS: (usize, usize) = (45, 10);
 #[test]
 fn the_roof_that_only_the_reference_has_is_outside_of_its_ring() {
     let (Some(ours), Some(theirs), Some(city)) = (Scene::load(), Scene::with_their_triangles(), city()) else { return };
-    let tile = io::citymodel::read(&city.join("3dbag_5910.city.json")).unwrap().model;
+    let tile = cityfiles::read(&city.join("3dbag_5910.city.json")).unwrap().model;
     let building = tile.objects.iter().find(|o| o.id == "NL.IMBAG.Pand.0503100000033695-0").unwrap();
     let detailed = building.geometries.iter().find(|g| g.lod == "2.2".parse().ok()).unwrap();
     let ring: Vec<[f64; 3]> = detailed.surfaces[410].rings[0]
@@ -222,7 +222,7 @@ fn maps_equal_the_stored_ones() {
 #[test]
 fn national_coordinates_change_nothing() {
     let Some(city) = city() else { return };
-    let near = io::citymodel::read(&city.join("3dbag_5910.city.json")).unwrap().model;
+    let near = cityfiles::read(&city.join("3dbag_5910.city.json")).unwrap().model;
     // To where EPSG:25832 has Munich, with the zone before the easting.
     let by = [32_606_000.0, 4_887_000.0, 500.0];
     let moved = |p: ModelPoint| ModelPoint::new(p.x + by[0], p.y + by[1], p.z + by[2]);

@@ -249,7 +249,8 @@ fn a_flight_sees_the_buildings_and_its_points_lie_on_them() {
     assert!(points.len() > 500, "{}", points.len());
     // The points of a reconstruction lie near the exact surface.
     let near = |name: &str| {
-        let truth = io::surfaces::read(folder.path().join("truth").join(name), &city::MeshConfig::default()).unwrap();
+        let truth =
+            cityfiles::surfaces::read(folder.path().join("truth").join(name), &city::MeshConfig::default()).unwrap();
         let distance = |p: &[f64; 3], q: &[f64; 3]| (0..3).map(|i| (p[i] - q[i]).powi(2)).sum::<f64>().sqrt();
         let closest = |p: &[f64; 3]| truth.positions.iter().map(|q| distance(p, q)).fold(f64::INFINITY, f64::min);
         let mut distances: Vec<f64> = points.iter().step_by(20).map(|p| closest(&p.position)).collect();

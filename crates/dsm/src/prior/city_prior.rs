@@ -47,7 +47,7 @@ impl CityPrior {
     }
 
     fn open(path: &Path) -> Result<Self, Cause> {
-        let file = io::citymodel::read(path)?;
+        let file = cityfiles::read(path)?;
         let mut mesh = TriangleMesh::from_model(&file.model, &MeshConfig::default())?.mesh;
         if mesh.triangles.is_empty() {
             return Err("no building of the model has a usable surface".into());

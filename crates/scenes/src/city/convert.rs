@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use io::citymodel::{CityJsonOptions, MeshFormat, move_images, write_cityjson, write_footprints, write_mesh};
+use cityfiles::{CityJsonOptions, MeshFormat, move_images, write_cityjson, write_footprints, write_mesh};
 use serde::Serialize;
 
 use super::account::{CityAccount, CitySummary};

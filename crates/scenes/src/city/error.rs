@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use city::ModelError;
-use io::citymodel::CityError;
+use cityfiles::CityError;
 use numeric::Cancelled;
 
 use job::error::{JobError, from_steps};

@@ -1,7 +1,7 @@
 //! Reading a city model and making its triangles.
 
 use city::{LodChoice, MeshConfig, MeshedModel, Scope, TriangleMesh};
-use io::citymodel::CityFile;
+use cityfiles::CityFile;
 
 use super::config::CityInput;
 use super::error::CityJobError;
@@ -16,7 +16,7 @@ pub(super) struct OpenedCity {
 /// Reads a model and makes its triangles. Solids are checked where an account is asked for.
 pub(super) fn open(input: &CityInput, progress: &dyn Progress) -> Result<OpenedCity, CityJobError> {
     progress.begin("reading the model", 2 + usize::from(input.account.is_some()));
-    let file = io::citymodel::read(&input.file)?;
+    let file = cityfiles::read(&input.file)?;
     progress.step();
     progress.check_cancelled()?;
     let config = MeshConfig {

@@ -1,7 +1,7 @@
 //! Everything that a dataset for perspective cameras is written from.
 
 use ::priors::{PriorModel, SampleConfig, Samples, View, Visible};
-use io::citymodel::CityFile;
+use cityfiles::CityFile;
 
 use super::cameras::SceneCameras;
 use super::config::PriorsConfig;

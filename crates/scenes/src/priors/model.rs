@@ -1,7 +1,7 @@
 //! The city model that priors are made of.
 
 use city::{LodChoice, MeshConfig, MeshedModel, ObjectStatus, Scope, TriangleMesh};
-use io::citymodel::CityFile;
+use cityfiles::CityFile;
 
 use super::config::PriorsConfig;
 use super::error::PriorsJobError;
@@ -15,7 +15,7 @@ pub(super) struct UsableModel {
 impl UsableModel {
     /// Reads a model and makes its triangles, of which there must be some.
     pub(super) fn read(config: &PriorsConfig) -> Result<Self, PriorsJobError> {
-        let file = io::citymodel::read(&config.model)?;
+        let file = cityfiles::read(&config.model)?;
         let mesh_config = MeshConfig {
             lod: config.lod.map_or_else(LodChoice::default, LodChoice::Only),
             scope: if config.all_objects { Scope::Everything } else { Scope::Buildings },

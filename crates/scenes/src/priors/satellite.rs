@@ -8,7 +8,7 @@ use ::priors::{
 };
 use camera::{ImageCorrection, Rpc, RpcCamera};
 use city::CrsReference;
-use io::citymodel::CityFile;
+use cityfiles::CityFile;
 use io::raster::{Band, BandData, ImageSource, Provenance, write_map_with_rpc, write_png_rgb};
 use numeric::Progress;
 use raster::NO_DATA;

@@ -21,7 +21,7 @@ pub enum EvalJobError {
     Points(#[from] io::points::PointsError),
     /// A mesh, city model or cloud cannot be read.
     #[error(transparent)]
-    SurfaceFile(#[from] io::surfaces::SurfaceFileError),
+    SurfaceFile(#[from] cityfiles::surfaces::SurfaceFileError),
     /// A map in the pixels of a camera cannot be read.
     #[error(transparent)]
     MapFile(#[from] io::maps::MapError),

@@ -54,7 +54,7 @@ pub enum EvalKind {
 pub fn detect_kind(test: &Path, reference: &Path) -> EvalKind {
     if io::maps::is_npy(test) && io::maps::is_npy(reference) {
         EvalKind::Maps
-    } else if io::surfaces::is_surface(test) && io::surfaces::is_surface(reference) {
+    } else if cityfiles::surfaces::is_surface(test) && cityfiles::surfaces::is_surface(reference) {
         EvalKind::Surfaces
     } else {
         EvalKind::Grids

@@ -2,9 +2,9 @@
 //! one local origin, in f64.
 
 use city::{MeshConfig, Scope};
+use cityfiles::surfaces::SurfaceFile;
 use crs::{HeightConverter, VerticalDatum};
 use eval::LocalSurface;
-use io::surfaces::SurfaceFile;
 
 use super::error::EvalJobError;
 use super::surface_config::SurfaceEvalConfig;
@@ -30,8 +30,8 @@ impl SurfaceInputs {
         let scope = if config.all_objects { Scope::Everything } else { Scope::Buildings };
         let lod = config.lod.map(city::LodChoice::Only).unwrap_or_default();
         let mesh = MeshConfig { lod, scope };
-        let mut test = io::surfaces::read(&config.test, &mesh)?;
-        let mut reference = io::surfaces::read(&config.reference, &mesh)?;
+        let mut test = cityfiles::surfaces::read(&config.test, &mesh)?;
+        let mut reference = cityfiles::surfaces::read(&config.reference, &mesh)?;
         let mut notes: Vec<String> = test.notes.drain(..).chain(reference.notes.drain(..)).collect();
         test.vertical = config.test_vertical.or(test.vertical);
         reference.vertical = config.reference_vertical.or(reference.vertical);
