@@ -23,7 +23,7 @@ import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 TOWN = ROOT / "data-samples/town"
-PAGE = ROOT / "crates/jobs/src/view/page"
+PAGE = ROOT / "crates/viewer/src/page"
 PACKAGES = ["numpy", "rasterio", "playwright", "pillow"]
 COLOURS_OF_FIGURES = 256
 KINDS = {".js": "text/javascript", ".css": "text/css", ".html": "text/html"}
