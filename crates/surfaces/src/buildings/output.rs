@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use io::raster::{Band, BandData, CogRaster, read_dem, write_cog, write_image_with_rpc, write_map, write_map_with_rpc};
+use io::raster::{Band, BandData, CogRaster, write_cog, write_map, write_map_with_rpc};
 use numeric::Progress;
 use raster::{GeoTransform, Grid, NO_DATA};
 
@@ -10,16 +10,14 @@ use super::config::BuildingMapConfig;
 use super::error::BuildingMapError;
 use super::input::{Input, Place};
 use crate::map_crs::MapCrs;
-use crate::ortho::{self, OrthoConfig};
-use job::corrections::{CorrectionSource, Corrections};
+use crate::ortho::{self, OrthoSurface};
+use job::corrections::Corrections;
 use job::files::FileError;
 use job::run_folder::surface_file;
 use job::threads;
 
 /// Name of the band.
 const BAND: &str = "building_index";
-/// Name of the file with the pointing correction that is handed to the ortho.
-const CORRECTION: &str = "correction.json";
 
 /// An index on a grid.
 pub(super) struct Placed {
@@ -42,23 +40,12 @@ impl Placed {
         progress: &dyn Progress,
     ) -> Result<Self, BuildingMapError> {
         let camera = Corrections::for_surface(surface, &config.corrections)?.camera(&config.image, progress)?;
-        let folder = tempfile::tempdir().map_err(|source| FileError::Folder { path: std::env::temp_dir(), source })?;
-        let (image, on_ground) = (folder.path().join("index.tif"), folder.path().join("ground.tif"));
-        let bands = [Band { description: BAND, data: BandData::F32(index) }];
-        write_image_with_rpc(&image, &bands, &camera.rpc, Some(f64::from(NO_DATA)), false)?;
-        let correction = folder.path().join(CORRECTION);
-        Corrections::of_image(image.clone(), camera.correction).write(&correction, false)?;
-        let mut laid = OrthoConfig::new(vec![image], surface.to_owned(), on_ground.clone());
-        laid.corrections = CorrectionSource::Report(correction);
-        laid.surface_vertical = config.surface_vertical;
-        laid.balance = false;
-        laid.threads = Some(threads::count(config.threads));
-        ortho::run(&laid, progress)?;
-        let mut found = read_dem(&on_ground)?;
+        let ground = OrthoSurface::read(&surface_file(surface), config.surface_vertical, progress)?;
+        let image = ground.image(&config.image, index, camera)?;
+        let mut laid = ortho::lay(&ground, image, progress)?.bands.swap_remove(0);
         // Interpolation overshoots at steps.
-        found.heights.data_mut().iter_mut().for_each(|value| *value = value.clamp(0.0, 1.0));
-        let map = MapCrs::of(&found).ok_or_else(|| ortho::OrthoError::NoCrs { path: surface_file(surface) })?;
-        Ok(Self { index: found.heights, map: Some((found.geotransform, map)) })
+        laid.data_mut().iter_mut().for_each(|value| *value = value.clamp(0.0, 1.0));
+        Ok(Self { index: laid, map: Some((ground.dsm.geotransform, ground.map)) })
     }
 
     /// Writes the index.

@@ -9,25 +9,19 @@
 use std::path::{Path, PathBuf};
 
 use classes::{SpectralCells, black_level, nir_gain, vegetation_index};
-use crs::Crs;
-use io::raster::{Band, BandData, CogRaster, Dem, ImageSource, IndexBands, write_cog};
+use io::raster::{Dem, ImageSource};
 use numeric::Progress;
-use raster::{Grid, Window};
+use raster::Grid;
 use serde::Serialize;
 
 use super::config::ClassesConfig;
 use super::error::ClassesError;
-use crate::ortho::{self, OrthoConfig, OrthoReport};
+use crate::ortho::{self, OrthoError, OrthoSurface};
 use job::corrections::Corrections;
-use job::files::FileError;
-use job::threads;
 
 /// Height above the surface at which crowns are looked for that the surface lacks, metres: a little
 /// above the middle of a small crown over the ground that stands in its place.
 const CROWN_M: f32 = 3.0;
-/// Names in the work folder.
-const LIFTED: &str = "lifted.tif";
-const ORTHO: &str = "ortho.tif";
 
 /// An image that gave the vegetation index.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -65,23 +59,20 @@ impl ImageIndex {
     /// buildings.
     pub(super) fn of_images(
         config: &ClassesConfig,
-        (surface, crs): (&Dem, Crs),
+        surface: &Dem,
         roofs: &Grid<bool>,
         progress: &dyn Progress,
     ) -> Result<Self, ClassesError> {
-        let work = tempfile::tempdir().map_err(|source| FileError::Folder { path: std::env::temp_dir(), source })?;
-        let lifted = work.path().join(LIFTED);
-        let heights = surface.heights.map(|height| height + CROWN_M);
-        let bands = [Band { description: "height_m", data: BandData::F32(&heights) }];
-        write_cog(&lifted, &CogRaster::new(&bands, surface.geotransform, crs), false).map_err(FileError::from)?;
+        let ground = OrthoSurface::of(surface.clone(), None, progress)?;
+        let above = ground.raised(CROWN_M)?;
         let corrections = Corrections::for_surface(&config.surface, &config.corrections)?;
-        let layer = Layer { config, surface, corrections: &corrections, ortho: work.path().join(ORTHO) };
+        let layer = Layer { config, ground, above, corrections: &corrections };
         let nothing = || surface.heights.map(|_| f32::NAN);
         let (mut index, mut sums, mut counts) = (nothing(), nothing(), surface.heights.map(|_| 0u16));
         let mut found = Vec::new();
         for path in &config.multispectral {
             progress.check_cancelled()?;
-            found.push(layer.look(path, roofs, &lifted, progress)?);
+            found.push(layer.look(path, roofs, progress)?);
         }
         found.sort_by(|a, b| a.0.incidence_deg.total_cmp(&b.0.incidence_deg));
         for (_, on_surface, above) in &found {
@@ -105,61 +96,49 @@ impl ImageIndex {
 /// What the images are laid on.
 struct Layer<'a> {
     config: &'a ClassesConfig,
-    surface: &'a Dem,
+    /// The surface.
+    ground: OrthoSurface,
+    /// The surface at the height of crowns that it lacks.
+    above: OrthoSurface,
     corrections: &'a Corrections,
-    /// File for the orthos, one after the other.
-    ortho: PathBuf,
 }
 
 impl Layer<'_> {
-    /// Returns the index of one image on the surface and on the lifted one.
+    /// Returns the index of one image on the surface and above it.
     fn look(
         &self,
         path: &Path,
         roofs: &Grid<bool>,
-        lifted: &Path,
         progress: &dyn Progress,
     ) -> Result<(IndexImage, Grid<f32>, Grid<f32>), ClassesError> {
-        let Self { config, surface, .. } = self;
         let source = ImageSource::open(path)?;
         let bands = source
-            .index_bands(config.red_band.as_ref(), config.nir_band.as_ref())?
+            .index_bands(self.config.red_band.as_ref(), self.config.nir_band.as_ref())?
             .ok_or_else(|| ClassesError::NoIndexBands { path: path.to_owned(), bands: source.info().bands })?;
-        let (report, red, nir) = self.lay(path, &surface.path, bands, progress)?;
-        let black = [&red, &nir].map(black_level);
-        let mut cells = SpectralCells { red: &red, nir: &nir, black, nir_gain: 1.0 };
+        let camera = self.corrections.camera(path, progress).map_err(OrthoError::from)?;
+        let image = self.ground.image(path, source, camera.clone())?;
+        let (width, height) = (self.ground.dsm.heights.width() as f64, self.ground.dsm.heights.height() as f64);
+        let (corrected, incidence_deg) = (image.corrected, image.eyeline.incidence_deg(width / 2.0, height / 2.0));
+        let laid = ortho::lay(&self.ground, image, progress)?;
+        let (red, nir) = (&laid.bands[bands.red - 1], &laid.bands[bands.nir - 1]);
+        let black = [red, nir].map(black_level);
+        let mut cells = SpectralCells { red, nir, black, nir_gain: 1.0 };
         cells.nir_gain = nir_gain(&cells, roofs);
         let index = vegetation_index(&cells);
-        let (_, red, nir) = self.lay(path, lifted, bands, progress)?;
-        let above = vegetation_index(&SpectralCells { red: &red, nir: &nir, ..cells });
-        let part = report.images.first();
+        let image = self.above.image(path, ImageSource::open(path)?, camera)?;
+        let above = ortho::lay(&self.above, image, progress)?;
+        let (red, nir) = (&above.bands[bands.red - 1], &above.bands[bands.nir - 1]);
+        let above = vegetation_index(&SpectralCells { red, nir, ..cells });
         let image = IndexImage {
             path: path.to_owned(),
             red_band: bands.red,
             nir_band: bands.nir,
             black,
             nir_gain: cells.nir_gain,
-            corrected: part.is_some_and(|part| part.corrected),
-            incidence_deg: part.map_or(0.0, |part| part.incidence_deg),
-            cells_seen: part.map_or(0, |part| part.counts.seen),
+            corrected,
+            incidence_deg,
+            cells_seen: laid.counts.first().map_or(0, |counts| counts.seen),
         };
         Ok((image, index, above))
-    }
-
-    /// Lays an image on a surface with the cells of ours, and returns red and near infrared.
-    fn lay(
-        &self,
-        path: &Path,
-        surface: &Path,
-        bands: IndexBands,
-        progress: &dyn Progress,
-    ) -> Result<(OrthoReport, Grid<f32>, Grid<f32>), ClassesError> {
-        let mut laid = OrthoConfig::new(vec![path.to_owned()], surface.to_owned(), self.ortho.clone());
-        (laid.threads, laid.overwrite) = (Some(threads::count(self.config.threads)), true);
-        let whole = Window::whole(self.surface.heights.width(), self.surface.heights.height());
-        let report = ortho::run_in_window(&laid, whole, self.corrections, progress)?;
-        let ortho = ImageSource::open(&self.ortho)?;
-        let band = |number| ortho.read_samples(number, ortho.window());
-        Ok((report, band(bands.red)?, band(bands.nir)?))
     }
 }

@@ -101,7 +101,7 @@ pub fn run(config: &ClassesConfig, progress: &dyn Progress) -> Result<ClassesRep
             false => {
                 // Roofs by their heights tell the scale of the bands.
                 let roofs = classify(&input, &config.classes)?.classes.map(|class| *class == BUILDING);
-                Some(ImageIndex::of_images(config, (&surface, crs), &roofs, progress)?)
+                Some(ImageIndex::of_images(config, &surface, &roofs, progress)?)
             }
         };
         let unsure = if made.is_some() { unsure_heights(&surface)? } else { None };

@@ -7,12 +7,17 @@ use ortho::MosaicRule;
 use serde::{Deserialize, Serialize};
 
 use super::error::OrthoError;
+use super::mosaic::Laying;
 use job::corrections::CorrectionSource;
 use job::error::SettingError;
 use job::run_folder::surface_file;
 
 /// Most images of an ortho: the mask holds their numbers as bytes.
 const IMAGES_MAX: usize = 255;
+
+/// Height by which a surface must stand above a line of sight to hide what is behind it, metres:
+/// the errors of f32 heights and of the line of sight are far below it.
+pub(super) const TOLERANCE_M: f64 = 0.05;
 
 /// An ortho of one or more images on a surface model.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -60,7 +65,7 @@ impl OrthoConfig {
             bounds: None,
             corrections: CorrectionSource::default(),
             surface_vertical: None,
-            tolerance_m: 0.05,
+            tolerance_m: TOLERANCE_M,
             balance: true,
             mosaic: MosaicRule::Best,
             keep_hidden: false,
@@ -84,6 +89,16 @@ impl OrthoConfig {
             return Err(SettingError::new("the cell size", cell, "a positive number of metres").into());
         }
         Ok(())
+    }
+
+    /// Returns how the images are laid on the surface.
+    pub(super) const fn laying(&self) -> Laying {
+        Laying {
+            tolerance_m: self.tolerance_m,
+            balance: self.balance,
+            mosaic: self.mosaic,
+            keep_hidden: self.keep_hidden,
+        }
     }
 
     /// Returns the file of the mask.

@@ -1,12 +1,12 @@
-//! Reads the surface model and the images with their cameras, and lays out the grid of the ortho.
+//! The surface, the images with their cameras, and the grid of an ortho.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use camera::{ImageCorrection, RpcCamera};
 use crs::{HeightConverter, MapProjection, VerticalDatum};
-use io::raster::{Dem, ImageSource, read_dem};
+use io::raster::{Dem, ImageSource, RasterError, read_dem};
 use occlusion::{Eyeline, GridGround};
-use raster::{GeoTransform, Window};
+use raster::{GeoTransform, Grid, Window};
 
 use numeric::Progress;
 
@@ -19,21 +19,67 @@ use job::error::SettingError;
 /// Most cells of all bands of an ortho: they are held in memory as f32.
 const CELLS_MAX: usize = 1 << 28;
 
-/// Inputs of an ortho.
-pub(super) struct OrthoInputs {
+/// The pixels of an image: an open file, or one band in memory.
+pub(crate) trait Pixels {
+    /// Columns and rows.
+    fn size(&self) -> (usize, usize);
+    /// Number of bands.
+    fn bands(&self) -> usize;
+    /// Returns a band, counted from 1, over a window. NaN marks no-data and the outside.
+    fn band(&self, number: usize, window: Window) -> Result<Grid<f32>, RasterError>;
+}
+
+impl Pixels for ImageSource {
+    fn size(&self) -> (usize, usize) {
+        (self.info().width, self.info().height)
+    }
+
+    fn bands(&self) -> usize {
+        self.info().bands
+    }
+
+    fn band(&self, number: usize, window: Window) -> Result<Grid<f32>, RasterError> {
+        self.read_samples(number, window)
+    }
+}
+
+impl Pixels for &Grid<f32> {
+    fn size(&self) -> (usize, usize) {
+        (self.width(), self.height())
+    }
+
+    fn bands(&self) -> usize {
+        1
+    }
+
+    fn band(&self, _: usize, window: Window) -> Result<Grid<f32>, RasterError> {
+        Ok(self.window(window, f32::NAN))
+    }
+}
+
+/// A surface that images are laid on.
+pub(crate) struct OrthoSurface {
     /// Surface model; heights in metres above the ellipsoid.
-    pub(super) dsm: Dem,
-    /// Side of the cells of the surface model, metres.
-    pub(super) cell_m: f64,
+    pub(crate) dsm: Dem,
     /// Its map.
-    pub(super) map: MapCrs,
-    pub(super) images: Vec<OrthoImage>,
+    pub(crate) map: MapCrs,
+    projection: MapProjection,
+    /// Side of its cells, metres.
+    pub(super) cell_m: f64,
+    /// Mean height, metres above the ellipsoid.
+    middle_m: f64,
+}
+
+/// Inputs of an ortho.
+pub(super) struct OrthoInputs<'a, P> {
+    pub(super) surface: &'a OrthoSurface,
+    pub(super) images: Vec<OrthoImage<P>>,
     pub(super) grid: OrthoGrid,
 }
 
 /// An image with its camera.
-pub(crate) struct OrthoImage {
-    pub(crate) source: ImageSource,
+pub(crate) struct OrthoImage<P = ImageSource> {
+    pub(crate) source: P,
     pub(crate) camera: RpcCamera,
     /// Whether a correction of the pointing was found.
     pub(crate) corrected: bool,
@@ -51,55 +97,95 @@ pub(super) struct OrthoGrid {
     pub(super) is_dsm: bool,
 }
 
-impl OrthoInputs {
-    /// Opens all inputs of a configuration. `window` are the cells of the surface model that the
+impl OrthoSurface {
+    /// Reads a surface model. `stated` is the datum of its heights, where the file names none or a
+    /// wrong one.
+    pub(crate) fn read(
+        path: &Path,
+        stated: Option<VerticalDatum>,
+        progress: &dyn Progress,
+    ) -> Result<Self, OrthoError> {
+        Self::of(read_dem(path)?, stated, progress)
+    }
+
+    /// Takes a surface model in memory, as [`OrthoSurface::read`] takes a file.
+    pub(crate) fn of(mut dsm: Dem, stated: Option<VerticalDatum>, progress: &dyn Progress) -> Result<Self, OrthoError> {
+        let path = || dsm.path.clone();
+        let map = MapCrs::of(&dsm).ok_or_else(|| OrthoError::NoCrs { path: path() })?;
+        let projection = map.projection()?;
+        let metres = projection.metres_per_unit().ok_or_else(|| OrthoError::InDegrees { path: path() })?;
+        let (along_columns, along_rows) = dsm.geotransform.cell_size();
+        let cell_m = metres * (along_columns * along_rows).sqrt();
+        to_ellipsoid(&mut dsm, stated, &projection, cell_m, progress)?;
+        let known: Vec<f64> = dsm.heights.data().iter().filter(|h| h.is_finite()).map(|&h| f64::from(h)).collect();
+        if known.is_empty() {
+            return Err(OrthoError::NoHeights { path: dsm.path });
+        }
+        let middle_m = known.iter().sum::<f64>() / known.len() as f64;
+        Ok(Self { dsm, map, projection, cell_m, middle_m })
+    }
+
+    /// Returns the surface raised by a height, metres.
+    pub(crate) fn raised(&self, by_m: f32) -> Result<Self, OrthoError> {
+        let heights = self.dsm.heights.map(|height| height + by_m);
+        let dsm = Dem { heights, vertical: Some(VerticalDatum::Ellipsoid), ..self.dsm.clone() };
+        Self::of(dsm, None, &numeric::Silent)
+    }
+
+    /// Looks at the surface through a camera. `path` names the image in errors.
+    pub(crate) fn image<P>(&self, path: &Path, source: P, camera: RpcCamera) -> Result<OrthoImage<P>, OrthoError> {
+        let corrected = camera.correction != ImageCorrection::IDENTITY;
+        let size = (self.dsm.heights.width(), self.dsm.heights.height());
+        let eyeline = Eyeline::new(&camera, &self.projection, &self.dsm.geotransform, size, self.middle_m)
+            .map_err(|source| OrthoError::NotSeen { path: path.to_owned(), source })?;
+        Ok(OrthoImage { source, camera, corrected, eyeline })
+    }
+}
+
+impl<'a> OrthoInputs<'a, ImageSource> {
+    /// Opens the images of a configuration. `window` are the cells of the surface model that the
     /// ortho has, in place of what the configuration says.
     pub(super) fn open(
         config: &OrthoConfig,
+        surface: &'a OrthoSurface,
         window: Option<Window>,
         corrections: &Corrections,
         progress: &dyn Progress,
     ) -> Result<Self, OrthoError> {
-        let path = config.surface_file();
-        let mut dsm = read_dem(&path)?;
-        let map = MapCrs::of(&dsm).ok_or_else(|| OrthoError::NoCrs { path: path.clone() })?;
-        let projection = map.projection()?;
-        let metres = projection.metres_per_unit().ok_or_else(|| OrthoError::InDegrees { path: path.clone() })?;
-        let (along_columns, along_rows) = dsm.geotransform.cell_size();
-        let cell_m = metres * (along_columns * along_rows).sqrt();
-        to_ellipsoid(&mut dsm, config.surface_vertical, &projection, cell_m, progress)?;
-        let known: Vec<f64> = dsm.heights.data().iter().filter(|h| h.is_finite()).map(|&h| f64::from(h)).collect();
-        if known.is_empty() {
-            return Err(OrthoError::NoHeights { path });
-        }
-        let middle_m = known.iter().sum::<f64>() / known.len() as f64;
         let grid = match window {
-            Some(window) => OrthoGrid::within(&dsm, window, &projection)?,
-            None => OrthoGrid::new(config, &dsm, &projection)?,
+            Some(window) => OrthoGrid::within(&surface.dsm, window, &surface.projection)?,
+            None => OrthoGrid::new(config, &surface.dsm, &surface.projection)?,
         };
-        let scene = Scene { dsm: &dsm, projection: &projection, middle_m, corrections };
-        let open = |path| OrthoImage::open(path, &scene, progress);
-        let images = config.images.iter().map(|path| open(path)).collect::<Result<Vec<_>, _>>()?;
+        let open = |path: &PathBuf| {
+            let source = ImageSource::open(path)?;
+            surface.image(path, source, corrections.camera(path, progress)?)
+        };
+        let images = config.images.iter().map(open).collect::<Result<Vec<_>, _>>()?;
         let bands = images.first().map_or(0, |image| image.source.info().bands);
         if let Some(other) = images.iter().find(|image| image.source.info().bands != bands) {
             let (path, found) = (other.source.path().to_owned(), other.source.info().bands);
             return Err(OrthoError::Bands { path, found, expected: bands });
         }
-        let cells = grid.width.saturating_mul(grid.height);
-        if cells.saturating_mul(bands) > CELLS_MAX {
-            return Err(OrthoError::TooLarge { width: grid.width, height: grid.height, bands });
-        }
-        Ok(Self { dsm, cell_m, map, images, grid })
+        Self { surface, images, grid }.checked()
     }
 }
 
-/// What the opening of an image needs to know of the surface.
-struct Scene<'a> {
-    dsm: &'a Dem,
-    projection: &'a MapProjection,
-    /// Mean height of the surface, metres above the ellipsoid.
-    middle_m: f64,
-    corrections: &'a Corrections,
+impl<'a, P: Pixels> OrthoInputs<'a, P> {
+    /// One image on the cells of the surface.
+    pub(super) fn of_image(surface: &'a OrthoSurface, image: OrthoImage<P>) -> Result<Self, OrthoError> {
+        let grid = OrthoGrid::of_surface(&surface.dsm, &surface.projection)?;
+        Self { surface, images: vec![image], grid }.checked()
+    }
+
+    /// Refuses an ortho that memory does not hold.
+    fn checked(self) -> Result<Self, OrthoError> {
+        let bands = self.images.first().map_or(0, |image| image.source.bands());
+        let cells = self.grid.width.saturating_mul(self.grid.height);
+        if cells.saturating_mul(bands) > CELLS_MAX {
+            return Err(OrthoError::TooLarge { width: self.grid.width, height: self.grid.height, bands });
+        }
+        Ok(self)
+    }
 }
 
 /// Converts the heights to heights above the ellipsoid.
@@ -124,19 +210,6 @@ fn to_ellipsoid(
     Ok(())
 }
 
-impl OrthoImage {
-    fn open(path: &Path, scene: &Scene<'_>, progress: &dyn Progress) -> Result<Self, OrthoError> {
-        let Scene { dsm, projection, middle_m, corrections } = scene;
-        let source = ImageSource::open(path)?;
-        let camera = corrections.camera(path, progress)?;
-        let corrected = camera.correction != ImageCorrection::IDENTITY;
-        let size = (dsm.heights.width(), dsm.heights.height());
-        let eyeline = Eyeline::new(&camera, projection, &dsm.geotransform, size, *middle_m)
-            .map_err(|source| OrthoError::NotSeen { path: path.to_owned(), source })?;
-        Ok(Self { source, camera, corrected, eyeline })
-    }
-}
-
 impl OrthoGrid {
     /// A window of the cells of the surface model.
     fn within(dsm: &Dem, window: Window, projection: &MapProjection) -> Result<Self, OrthoError> {
@@ -146,12 +219,18 @@ impl OrthoGrid {
         Ok(Self { geotransform, width, height, ground, is_dsm: false })
     }
 
-    fn new(config: &OrthoConfig, dsm: &Dem, projection: &MapProjection) -> Result<Self, OrthoError> {
+    /// The cells of the surface model.
+    fn of_surface(dsm: &Dem, projection: &MapProjection) -> Result<Self, OrthoError> {
         let (width, height) = (dsm.heights.width(), dsm.heights.height());
+        let ground = GridGround::new(projection, &dsm.geotransform, (width, height))?;
+        Ok(Self { geotransform: dsm.geotransform, width, height, ground, is_dsm: true })
+    }
+
+    fn new(config: &OrthoConfig, dsm: &Dem, projection: &MapProjection) -> Result<Self, OrthoError> {
         if config.cell_m.is_none() && config.bounds.is_none() {
-            let ground = GridGround::new(projection, &dsm.geotransform, (width, height))?;
-            return Ok(Self { geotransform: dsm.geotransform, width, height, ground, is_dsm: true });
+            return Self::of_surface(dsm, projection);
         }
+        let (width, height) = (dsm.heights.width(), dsm.heights.height());
         let cell = config.cell_m.unwrap_or_else(|| dsm.geotransform.cell_size().0);
         if !(cell > 0.0 && cell.is_finite()) {
             return Err(SettingError::new("the cell size", cell, "a positive number of metres").into());

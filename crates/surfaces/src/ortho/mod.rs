@@ -23,6 +23,6 @@ pub use output::{OrthoPart, OrthoReport};
 pub use run::run;
 pub use states::OrthoCounts;
 
-pub(crate) use inputs::OrthoImage;
-pub(crate) use run::run_in_window;
+pub(crate) use inputs::{OrthoImage, OrthoSurface};
+pub(crate) use run::{lay, run_in_window};
 pub(crate) use view::{Cell, look};

@@ -8,9 +8,8 @@ use ortho::{Balance, MosaicRule, Pair, Sight, balance, best_view, feather_weight
 use raster::Grid;
 use rayon::prelude::*;
 
-use super::config::OrthoConfig;
 use super::error::OrthoError;
-use super::inputs::{OrthoGrid, OrthoInputs};
+use super::inputs::{OrthoGrid, OrthoInputs, Pixels};
 use super::states::{HIDDEN, OUTSIDE, OrthoCounts, SEEN, VOID};
 use super::view::{Cell, Seen, look};
 
@@ -23,10 +22,20 @@ const COMPARED: usize = 60_000;
 /// do not match to the pixel.
 const FEATHER_CELLS: usize = 16;
 
+/// How images are laid on a surface.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Laying {
+    /// As in the configuration of an ortho.
+    pub(super) tolerance_m: f64,
+    pub(super) balance: bool,
+    pub(super) mosaic: MosaicRule,
+    pub(super) keep_hidden: bool,
+}
+
 /// An ortho.
-pub(super) struct Ortho {
+pub(crate) struct Ortho {
     /// Values by band, NaN where there is none.
-    pub(super) bands: Vec<Grid<f32>>,
+    pub(crate) bands: Vec<Grid<f32>>,
     /// [`SEEN`], [`HIDDEN`], [`OUTSIDE`] or [`VOID`].
     pub(super) state: Grid<u8>,
     /// Number of the image, from 1; 0 where there is none.
@@ -34,15 +43,22 @@ pub(super) struct Ortho {
     /// Gains and offsets by image and band.
     pub(super) balances: Vec<Vec<Balance>>,
     /// Counts of cells by image.
-    pub(super) counts: Vec<OrthoCounts>,
+    pub(crate) counts: Vec<OrthoCounts>,
 }
 
 /// Makes the ortho.
-pub(super) fn make(inputs: &OrthoInputs, config: &OrthoConfig, progress: &dyn Progress) -> Result<Ortho, OrthoError> {
-    let surface = OcclusionSurface::new(&inputs.dsm.heights, inputs.cell_m);
-    let work = Work { inputs, tolerance_m: config.tolerance_m, surface: &surface };
-    let bands = inputs.images[0].source.info().bands;
-    let balances = if !config.balance || inputs.images.len() < 2 {
+///
+/// # Errors
+/// [`OrthoError::NothingSeen`], and pixels that cannot be read.
+pub(super) fn make<P: Pixels>(
+    inputs: &OrthoInputs<'_, P>,
+    laying: Laying,
+    progress: &dyn Progress,
+) -> Result<Ortho, OrthoError> {
+    let surface = OcclusionSurface::new(&inputs.surface.dsm.heights, inputs.surface.cell_m);
+    let work = Work { inputs, tolerance_m: laying.tolerance_m, surface: &surface };
+    let bands = inputs.images[0].source.bands();
+    let balances = if !laying.balance || inputs.images.len() < 2 {
         vec![vec![Balance::NONE; bands]; inputs.images.len()]
     } else {
         work.balances(bands, progress)?
@@ -60,13 +76,17 @@ pub(super) fn make(inputs: &OrthoInputs, config: &OrthoConfig, progress: &dyn Pr
     for block in blocks {
         progress.check_cancelled()?;
         // Seams are blended with what lies around them, beyond the block.
-        let margin = if config.mosaic == MosaicRule::Feather { FEATHER_CELLS } else { 0 };
+        let margin = if laying.mosaic == MosaicRule::Feather { FEATHER_CELLS } else { 0 };
         let wide = block.grown(margin, (width, height));
         let cells = work.cells(&wide, 1);
         let seen = work.look(&cells)?;
         let part = LookedAt { block: &wide, cells: &cells, seen: &seen };
-        ortho.take(&block, &part, config);
+        ortho.take(&block, &part, laying);
         progress.step();
+    }
+    if !ortho.state.data().iter().any(|state| matches!(*state, SEEN | HIDDEN)) {
+        let heights = ortho.state.data().iter().filter(|state| **state != VOID).count();
+        return Err(OrthoError::NothingSeen { cells: ortho.state.data().len(), heights });
     }
     Ok(ortho)
 }
@@ -120,13 +140,13 @@ impl LookedAt<'_> {
 }
 
 /// What every block needs.
-struct Work<'a> {
-    inputs: &'a OrthoInputs,
+struct Work<'a, P> {
+    inputs: &'a OrthoInputs<'a, P>,
     tolerance_m: f64,
     surface: &'a OcclusionSurface<'a>,
 }
 
-impl Work<'_> {
+impl<P: Pixels> Work<'_, P> {
     /// Divides the ortho into blocks, row by row.
     fn blocks(&self) -> Vec<Block> {
         let grid = &self.inputs.grid;
@@ -145,7 +165,7 @@ impl Work<'_> {
     fn cells(&self, block: &Block, stride: usize) -> Vec<Option<Cell>> {
         let on = |first: usize, length: usize| (first.next_multiple_of(stride)..first + length).step_by(stride);
         let rows: Vec<usize> = on(block.top, block.height).collect();
-        let ground = Ground { grid: &self.inputs.grid, dsm: &self.inputs.dsm, surface: self.surface };
+        let ground = Ground { grid: &self.inputs.grid, dsm: &self.inputs.surface.dsm, surface: self.surface };
         let ground = &ground;
         rows.par_iter()
             .flat_map_iter(|&row| on(block.left, block.width).map(move |column| ground.cell(column, row)))
@@ -228,9 +248,9 @@ fn compare(pair: &mut Pair, band: usize, seen: &[Seen]) {
 impl Ortho {
     /// Fills the cells of a block from the images. `part` holds the block, and what lies around it
     /// as far as it counts.
-    fn take(&mut self, block: &Block, part: &LookedAt<'_>, config: &OrthoConfig) {
+    fn take(&mut self, block: &Block, part: &LookedAt<'_>, laying: Laying) {
         let seen = part.seen;
-        let weights = if config.mosaic == MosaicRule::Feather { part.feather_weights() } else { Vec::new() };
+        let weights = if laying.mosaic == MosaicRule::Feather { part.feather_weights() } else { Vec::new() };
         let mut values = Vec::with_capacity(seen.len());
         for row in block.top..block.top + block.height {
             for column in block.left..block.left + block.width {
@@ -250,13 +270,13 @@ impl Ortho {
                     (None, Some(_)) => HIDDEN,
                     (None, None) => OUTSIDE,
                 };
-                let Some(view) = best.or(hidden.filter(|_| config.keep_hidden)) else { continue };
+                let Some(view) = best.or(hidden.filter(|_| laying.keep_hidden)) else { continue };
                 self.view[at] = (view + 1) as u8;
                 self.counts[view].used += usize::from(best.is_some());
                 for (band, grid) in self.bands.iter_mut().enumerate() {
                     let value = |view: usize| self.balances[view][band].apply(seen[view].values[band][k]);
                     let is_seen = |view: &usize| matches!(seen[*view].sights[k], Sight::Seen { .. });
-                    grid[at] = match config.mosaic {
+                    grid[at] = match laying.mosaic {
                         _ if best.is_none() => value(view),
                         MosaicRule::Best => value(view),
                         MosaicRule::Feather => {

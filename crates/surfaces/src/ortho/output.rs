@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use io::raster::{Band, BandData, CogRaster, LumaRule, Provenance, SampleType, iso_time, write_cog};
+use io::raster::{Band, BandData, CogRaster, ImageSource, LumaRule, Provenance, SampleType, iso_time, write_cog};
 use ortho::Balance;
 use raster::Grid;
 use report::{Legend, LightEnd, MapLayer};
@@ -66,7 +66,11 @@ pub struct OrthoPart {
 }
 
 /// Writes the mask, then the ortho.
-pub(super) fn write(config: &OrthoConfig, inputs: &OrthoInputs, made: &Ortho) -> Result<OrthoReport, OrthoError> {
+pub(super) fn write(
+    config: &OrthoConfig,
+    inputs: &OrthoInputs<'_, ImageSource>,
+    made: &Ortho,
+) -> Result<OrthoReport, OrthoError> {
     let threads = threads::count(config.threads);
     let mask = config.mask();
     let mask_bands = [
@@ -74,7 +78,7 @@ pub(super) fn write(config: &OrthoConfig, inputs: &OrthoInputs, made: &Ortho) ->
         Band { description: "image_from_1", data: BandData::U8(&made.view) },
     ];
     let provenance = provenance(inputs);
-    let plain = CogRaster::new(&mask_bands, inputs.grid.geotransform, inputs.map.ellipsoidal());
+    let plain = CogRaster::new(&mask_bands, inputs.grid.geotransform, inputs.surface.map.ellipsoidal());
     let raster = CogRaster { threads, holds_heights: false, provenance: Some(&provenance), ..plain };
     write_cog(&mask, &raster, config.overwrite).map_err(FileError::from)?;
     let style = state_legend().qml();
@@ -103,7 +107,7 @@ pub(super) fn write(config: &OrthoConfig, inputs: &OrthoInputs, made: &Ortho) ->
 /// Writes the ortho in the type of its samples.
 struct OrthoWriter<'a> {
     config: &'a OrthoConfig,
-    inputs: &'a OrthoInputs,
+    inputs: &'a OrthoInputs<'a, ImageSource>,
     /// Names of the bands, the alpha band included.
     names: &'a [String],
     colours: Option<[usize; 3]>,
@@ -129,7 +133,7 @@ impl OrthoWriter<'_> {
         let bands: Vec<Band<'_>> =
             (self.names.iter().zip(&grids)).map(|(description, grid)| Band { description, data: data(grid) }).collect();
         let provenance = provenance(self.inputs);
-        let plain = CogRaster::new(&bands, self.inputs.grid.geotransform, self.inputs.map.ellipsoidal());
+        let plain = CogRaster::new(&bands, self.inputs.grid.geotransform, self.inputs.surface.map.ellipsoidal());
         let raster = CogRaster {
             no_data: self.colours.is_none().then_some(f64::from(no_data)),
             threads: self.threads,
@@ -145,7 +149,7 @@ impl OrthoWriter<'_> {
 }
 
 /// Returns the images and their times.
-fn provenance(inputs: &OrthoInputs) -> Provenance {
+fn provenance(inputs: &OrthoInputs<'_, ImageSource>) -> Provenance {
     let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     Provenance {
         sources: inputs.images.iter().map(|image| name(image.source.path())).collect(),
@@ -154,7 +158,7 @@ fn provenance(inputs: &OrthoInputs) -> Provenance {
 }
 
 /// Returns the bands that are red, green and blue, where that is so in all images.
-fn colours(inputs: &OrthoInputs) -> Option<[usize; 3]> {
+fn colours(inputs: &OrthoInputs<'_, ImageSource>) -> Option<[usize; 3]> {
     let mut rules = inputs.images.iter().map(|image| &image.source.info().luma);
     match rules.next() {
         Some(LumaRule::Rgb(bands)) if rules.all(|rule| *rule == LumaRule::Rgb(*bands)) => Some(*bands),
@@ -169,7 +173,7 @@ fn whole(value: f32, void: f32, most: f32) -> f32 {
 }
 
 /// Returns the smallest type that holds the samples of all images.
-fn sample_type(inputs: &OrthoInputs) -> SampleType {
+fn sample_type(inputs: &OrthoInputs<'_, ImageSource>) -> SampleType {
     let types = inputs.images.iter().map(|image| image.source.info().sample);
     types.fold(SampleType::U8, |widest, next| match (widest, next) {
         (SampleType::U8, SampleType::U8) => SampleType::U8,
@@ -179,9 +183,14 @@ fn sample_type(inputs: &OrthoInputs) -> SampleType {
 }
 
 /// Makes the report and writes it, with its page.
-fn report(config: &OrthoConfig, inputs: &OrthoInputs, made: &Ortho, mask: PathBuf) -> Result<OrthoReport, OrthoError> {
+fn report(
+    config: &OrthoConfig,
+    inputs: &OrthoInputs<'_, ImageSource>,
+    made: &Ortho,
+    mask: PathBuf,
+) -> Result<OrthoReport, OrthoError> {
     let count = |state: u8| made.state.data().iter().filter(|&&s| s == state).count();
-    let middle = (inputs.dsm.heights.width() as f64 / 2.0, inputs.dsm.heights.height() as f64 / 2.0);
+    let middle = (inputs.surface.dsm.heights.width() as f64 / 2.0, inputs.surface.dsm.heights.height() as f64 / 2.0);
     let images = inputs.images.iter().zip(&made.counts).zip(&made.balances);
     let images = images.map(|((image, counts), balance)| OrthoPart {
         path: image.source.path().to_owned(),
@@ -209,7 +218,7 @@ fn report(config: &OrthoConfig, inputs: &OrthoInputs, made: &Ortho, mask: PathBu
 
 /// Returns the maps of the page: the picture, the states of the cells, and the images they are
 /// from.
-fn layers(inputs: &OrthoInputs, made: &Ortho) -> Vec<MapLayer> {
+fn layers(inputs: &OrthoInputs<'_, ImageSource>, made: &Ortho) -> Vec<MapLayer> {
     let shown = colours(inputs).unwrap_or([1; 3]);
     let stretched = shown.map(|band| {
         let (small, _) = report_page::thinned(&made.bands[band - 1]);

@@ -1,13 +1,14 @@
 //! Runs the ortho job.
 
 use numeric::Progress;
+use ortho::MosaicRule;
 use raster::Window;
 
-use super::config::OrthoConfig;
+use super::config::{OrthoConfig, TOLERANCE_M};
 use super::error::OrthoError;
-use super::inputs::OrthoInputs;
+use super::inputs::{OrthoImage, OrthoInputs, OrthoSurface, Pixels};
+use super::mosaic::{Laying, Ortho};
 use super::output::OrthoReport;
-use super::states::{HIDDEN, SEEN, VOID};
 use super::{mosaic, output};
 use job::corrections::Corrections;
 use job::{files, report_page, threads};
@@ -63,12 +64,23 @@ fn run_on(
     files::refuse_existing(&config.mask_style(), config.overwrite)?;
     report_page::refuse_existing(&config.report(), config.overwrite)?;
     threads::install(config.threads, || {
-        let inputs = OrthoInputs::open(config, window, corrections, progress)?;
-        let made = mosaic::make(&inputs, config, progress)?;
-        if !made.state.data().iter().any(|state| matches!(*state, SEEN | HIDDEN)) {
-            let heights = made.state.data().iter().filter(|state| **state != VOID).count();
-            return Err(OrthoError::NothingSeen { cells: made.state.data().len(), heights });
-        }
+        let surface = OrthoSurface::read(&config.surface_file(), config.surface_vertical, progress)?;
+        let inputs = OrthoInputs::open(config, &surface, window, corrections, progress)?;
+        let made = mosaic::make(&inputs, config.laying(), progress)?;
         output::write(config, &inputs, &made)
     })?
+}
+
+/// Lays one image on the cells of a surface, in memory. Hidden cells have no value.
+///
+/// # Errors
+/// [`OrthoError::NothingSeen`], and pixels that cannot be read.
+pub(crate) fn lay<P: Pixels>(
+    surface: &OrthoSurface,
+    image: OrthoImage<P>,
+    progress: &dyn Progress,
+) -> Result<Ortho, OrthoError> {
+    let inputs = OrthoInputs::of_image(surface, image)?;
+    let laying = Laying { tolerance_m: TOLERANCE_M, balance: false, mosaic: MosaicRule::Best, keep_hidden: false };
+    mosaic::make(&inputs, laying, progress)
 }

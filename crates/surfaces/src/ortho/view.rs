@@ -3,14 +3,13 @@
 
 use camera::ImagePoint;
 use geodesy::LonLatHeight;
-use io::raster::ImageSource;
 use occlusion::{Eyeline, OcclusionSurface};
 use ortho::Sight;
 use raster::{Grid, Window, bicubic};
 use rayon::prelude::*;
 
 use super::error::OrthoError;
-use super::inputs::OrthoImage;
+use super::inputs::{OrthoImage, Pixels};
 
 /// Margin around the needed pixels, for the bicubic interpolation, pixels.
 const MARGIN: usize = 3;
@@ -34,13 +33,14 @@ pub(crate) struct Seen {
 }
 
 /// Looks at cells through an image. Hidden cells get the values of what hides them.
-pub(crate) fn look(
+pub(crate) fn look<P: Pixels>(
     surface: &OcclusionSurface<'_>,
-    image: &OrthoImage,
+    image: &OrthoImage<P>,
     cells: &[Option<Cell>],
     tolerance_m: f64,
 ) -> Result<Seen, OrthoError> {
-    let (width, height) = (image.source.info().width as f64 - 1.0, image.source.info().height as f64 - 1.0);
+    let (width, height) = image.source.size();
+    let (width, height) = (width as f64 - 1.0, height as f64 - 1.0);
     let inside = |p: &ImagePoint| (0.0..=width).contains(&p.sample) && (0.0..=height).contains(&p.line);
     // Threads can share the geometry of the image, but not its open file.
     let (camera, eyeline) = (&image.camera, &image.eyeline);
@@ -75,8 +75,8 @@ fn sight(surface: &OcclusionSurface<'_>, eyeline: &Eyeline, cell: &Cell, toleran
 }
 
 /// Reads the values of all bands at image points.
-fn values(source: &ImageSource, places: &[Option<ImagePoint>]) -> Result<Vec<Vec<f32>>, OrthoError> {
-    let bands = source.info().bands;
+fn values(source: &impl Pixels, places: &[Option<ImagePoint>]) -> Result<Vec<Vec<f32>>, OrthoError> {
+    let bands = source.bands();
     let Some(window) = window(places) else { return Ok(vec![vec![f32::NAN; places.len()]; bands]) };
     let pixels = window.width.saturating_mul(window.height);
     if pixels > PIXELS_MAX && places.len() > 1 {
@@ -87,14 +87,14 @@ fn values(source: &ImageSource, places: &[Option<ImagePoint>]) -> Result<Vec<Vec
         None => f32::NAN,
     };
     let band = |number: usize| {
-        let pixels = source.read_samples(number, window)?;
+        let pixels = source.band(number, window)?;
         Ok(places.par_iter().map(|place| sample(&pixels, place)).collect())
     };
     (1..=bands).map(band).collect()
 }
 
 /// Reads the values in two halves.
-fn halves(source: &ImageSource, places: &[Option<ImagePoint>]) -> Result<Vec<Vec<f32>>, OrthoError> {
+fn halves(source: &impl Pixels, places: &[Option<ImagePoint>]) -> Result<Vec<Vec<f32>>, OrthoError> {
     let (first, second) = places.split_at(places.len() / 2);
     let (mut first, second) = (values(source, first)?, values(source, second)?);
     first.iter_mut().zip(second).for_each(|(all, rest)| all.extend(rest));
