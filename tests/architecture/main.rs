@@ -286,6 +286,21 @@ fn errors_of_the_library_name_no_command_line_flags() {
     assert!(names::names_flag("give --gsd") && !names::names_flag("a -- b"));
 }
 
+/// A job hands values to another one. The folders in which a job prepares its outputs lie in the
+/// output folder, and are `job`'s.
+#[test]
+fn no_temporary_files_lie_between_jobs() {
+    let broken: Vec<String> = product_sources()
+        .iter()
+        .filter(|path| {
+            let code = product_code(&fs::read_to_string(path).expect("a source is readable"));
+            ["tempfile::tempdir(", "tempfile::NamedTempFile", "env::temp_dir("].iter().any(|word| code.contains(word))
+        })
+        .map(|path| format!("{}: temporary files are for tests; hand over the value in memory", path.display()))
+        .collect();
+    report(&broken);
+}
+
 /// The command line parses and prints. Whatever takes time or writes files is a job of the library.
 /// It has at most 150 lines for each command, as it had when its twenty commands took 3,000.
 #[test]

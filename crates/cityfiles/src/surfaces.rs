@@ -196,6 +196,14 @@ fn nothing_if(is_empty: bool, path: &Path, what: &str) -> Result<(), SurfaceFile
 }
 
 impl SurfaceFile {
+    /// A mesh in memory. `path` names it in reports and errors, `crs` defines its reference system.
+    pub fn of_mesh(path: &Path, positions: Vec<[f64; 3]>, triangles: Vec<[u32; 3]>, crs: Option<&str>) -> Self {
+        let format = "mesh".to_owned();
+        let mut surface = Self { path: path.to_owned(), format, positions, triangles, ..Self::empty() };
+        surface.name_crs(crs.map(str::to_owned));
+        surface
+    }
+
     fn empty() -> Self {
         Self {
             path: PathBuf::new(),

@@ -1,7 +1,7 @@
 //! Writes a mesh with a colour at every corner: binary little-endian PLY, or binary glTF 2.0.
 //!
 //! PLY keeps the axes of the frame, with the origin of its positions in a comment, as
-//! [`crate::surfaces`] reads it. glTF has the axes x east, y up, z south, with the origin as the
+//! `cityfiles::surfaces` reads it. glTF has the axes x east, y up, z south, with the origin as the
 //! translation of its only node. Its colours are linear, those of pictures and PLY are not.
 
 use std::path::Path;

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use cityfiles::surfaces::SurfaceFile;
 use io::coloured_mesh::{ColouredMesh, write_mesh_glb, write_mesh_ply};
 use numeric::Progress;
 use serde::Serialize;
@@ -16,7 +17,7 @@ use job::dataset_folder::sparse_folder;
 use job::files::{self, FileError};
 use job::report_page;
 use job::threads;
-use surfaces::eval::{SurfaceEvalConfig, SurfaceEvalReport, evaluate_surfaces};
+use surfaces::eval::{SurfaceEvalConfig, SurfaceEvalReport, evaluate_surface};
 
 /// A finished mesh.
 #[derive(Debug, Clone, Serialize)]
@@ -154,12 +155,10 @@ fn compared(
     progress: &dyn Progress,
 ) -> Result<Option<SurfaceEvalReport>, MeshJobError> {
     let Some(reference) = &config.reference else { return Ok(None) };
-    // A GLB is not read back: its twin as PLY is compared.
-    let folder = tempfile::tempdir().map_err(|source| FileError::Unwritable { path: config.output.clone(), source })?;
-    let test = folder.path().join("mesh.ply");
-    write_mesh_ply(&test, &coloured(mesh, place), true).map_err(FileError::write)?;
-    let eval = SurfaceEvalConfig::new(test, reference.clone());
-    let mut report = evaluate_surfaces(&eval, progress).map_err(|error| MeshJobError::Comparison(Box::new(error)))?;
-    report.protocol.test = config.output.display().to_string();
+    let ColouredMesh { positions, triangles, origin, crs, .. } = coloured(mesh, place);
+    let positions = positions.iter().map(|p| [0, 1, 2].map(|i| f64::from(p[i]) + origin[i])).collect();
+    let test = SurfaceFile::of_mesh(&config.output, positions, triangles.to_vec(), crs);
+    let eval = SurfaceEvalConfig::new(config.output.clone(), reference.clone());
+    let report = evaluate_surface(test, &eval, progress).map_err(|error| MeshJobError::Comparison(Box::new(error)))?;
     Ok(Some(report))
 }

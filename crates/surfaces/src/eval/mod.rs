@@ -36,7 +36,7 @@ pub use grids::{GridEvalReport, compare_grids};
 pub use maps::{MapEvalConfig, MapEvalReport, MapKind, compare_maps};
 pub use requirements::{EvalRequirements, MinCompleteness};
 pub use surface_config::SurfaceEvalConfig;
-pub use surfaces::{SurfaceEvalReport, SurfaceProtocol, evaluate_surfaces};
+pub use surfaces::{SurfaceEvalReport, SurfaceProtocol, evaluate_surface, evaluate_surfaces};
 
 /// What two files hold, and so which job compares them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

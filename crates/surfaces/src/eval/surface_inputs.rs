@@ -25,12 +25,15 @@ pub(super) struct SurfaceInputs {
 }
 
 impl SurfaceInputs {
-    /// Reads both surfaces of a configuration.
-    pub(super) fn read(config: &SurfaceEvalConfig) -> Result<Self, EvalJobError> {
+    /// Reads the surfaces of a configuration. A `given` surface takes the place of the test's file.
+    pub(super) fn read(config: &SurfaceEvalConfig, given: Option<SurfaceFile>) -> Result<Self, EvalJobError> {
         let scope = if config.all_objects { Scope::Everything } else { Scope::Buildings };
         let lod = config.lod.map(city::LodChoice::Only).unwrap_or_default();
         let mesh = MeshConfig { lod, scope };
-        let mut test = cityfiles::surfaces::read(&config.test, &mesh)?;
+        let mut test = match given {
+            Some(test) => test,
+            None => cityfiles::surfaces::read(&config.test, &mesh)?,
+        };
         let mut reference = cityfiles::surfaces::read(&config.reference, &mesh)?;
         let mut notes: Vec<String> = test.notes.drain(..).chain(reference.notes.drain(..)).collect();
         test.vertical = config.test_vertical.or(test.vertical);

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use cityfiles::surfaces::SurfaceFile;
 use eval::{SurfaceComparison, SurfaceComparisonConfig, compare_surfaces};
 use numeric::Progress;
 use serde::Serialize;
@@ -83,17 +84,35 @@ pub fn evaluate_surfaces(
     progress: &dyn Progress,
 ) -> Result<SurfaceEvalReport, EvalJobError> {
     config.validate()?;
-    threads::install(config.threads, || evaluate(config, progress))?
+    threads::install(config.threads, || evaluate(config, None, progress))?
 }
 
-fn evaluate(config: &SurfaceEvalConfig, progress: &dyn Progress) -> Result<SurfaceEvalReport, EvalJobError> {
+/// Compares a surface in memory with the reference of a configuration, as [`evaluate_surfaces`]
+/// does with the file that the configuration calls the test.
+///
+/// # Errors
+/// As [`evaluate_surfaces`].
+pub fn evaluate_surface(
+    test: SurfaceFile,
+    config: &SurfaceEvalConfig,
+    progress: &dyn Progress,
+) -> Result<SurfaceEvalReport, EvalJobError> {
+    config.validate()?;
+    threads::install(config.threads, || evaluate(config, Some(test), progress))?
+}
+
+fn evaluate(
+    config: &SurfaceEvalConfig,
+    test: Option<SurfaceFile>,
+    progress: &dyn Progress,
+) -> Result<SurfaceEvalReport, EvalJobError> {
     if let Some(folder) = &config.output {
         check_ours(folder, &[folder.join(REPORT_JSON)], config.overwrite)?;
         OutputFolder::check(folder)?;
     }
     progress.begin("evaluation", 2);
     let settings = config.surface_config();
-    let inputs = SurfaceInputs::read(config)?;
+    let inputs = SurfaceInputs::read(config, test)?;
     progress.step();
     progress.check_cancelled()?;
     let result = compare_surfaces(&inputs.test, &inputs.reference, &settings)?;
