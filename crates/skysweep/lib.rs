@@ -35,8 +35,8 @@
 //! - Methods: [`sweep`] (the height sweep), [`eval`], [`priors`], [`heightmap`], [`groundview`],
 //!   [`ortho`], [`splats`], [`terrain`], [`train`], [`tsdf`], [`change`],
 //!   [`classes`], [`buildings`], [`simulate`].
-//! - Files: [`io`] reads and writes rasters, cameras, points and splats, [`cityfiles`] city models and meshes,
-//!   and [`report`] makes pictures and pages.
+//! - Files: [`io`] reads and writes rasters, cameras, points and splats, [`cityfiles`] city models
+//!   and meshes, and [`report`] makes pictures and pages.
 //! - [`numeric`] has progress and cancellation, seeded random numbers and order statistics.
 //!
 //! # Example

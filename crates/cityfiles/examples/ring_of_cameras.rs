@@ -1,8 +1,8 @@
 //! Makes cameras in a ring around a city model that look down on it at 45°, as a COLMAP text model.
 //!
-//! Usage: `cargo run -p skysweep-cityfiles --example ring_of_cameras -- MODEL OUT [COUNT]`. The origin of
-//! the cameras' frame is on whole metres in the middle of the model. The offset from the model's
-//! frame to it is printed for `skysweep priors --offset`.
+//! Usage: `cargo run -p skysweep-cityfiles --example ring_of_cameras -- MODEL OUT [COUNT]`. The
+//! origin of the cameras' frame is on whole metres in the middle of the model. The offset from the
+//! model's frame to it is printed for `skysweep priors --offset`.
 
 #![allow(clippy::print_stdout)]
 
