@@ -7,8 +7,7 @@
 use std::error::Error;
 use std::path::PathBuf;
 
-use skysweep::jobs::dsm::{self, DsmConfig, Preset};
-use skysweep::numeric::Silent;
+use skysweep::prelude::*;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args_os().skip(1).map(PathBuf::from);

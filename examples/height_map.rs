@@ -8,8 +8,7 @@ use std::error::Error;
 use std::path::PathBuf;
 
 use skysweep::jobs::camera_stand::{StandConfig, StandSource};
-use skysweep::jobs::heightmap::{self, HeightMapConfig};
-use skysweep::numeric::Silent;
+use skysweep::prelude::*;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let dsm = concat!(env!("CARGO_MANIFEST_DIR"), "/data-samples/town/truth/dsm.tif");

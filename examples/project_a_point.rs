@@ -8,15 +8,13 @@
 use std::error::Error;
 use std::path::PathBuf;
 
-use skysweep::camera::RpcCamera;
-use skysweep::geodesy::LonLatHeight;
-use skysweep::io;
+use skysweep::prelude::*;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let sample = || concat!(env!("CARGO_MANIFEST_DIR"), "/data-samples/town/view_1.tif").into();
     let image: PathBuf = std::env::args_os().nth(1).map_or_else(sample, PathBuf::from);
 
-    let camera = RpcCamera::new(io::rpc::read(&image)?.rpc);
+    let camera = RpcCamera::new(read_rpc(&image)?.rpc);
     let centre = camera.rpc.domain().centre;
     let ground = LonLatHeight { height_m: centre.height_m + 10.0, ..centre };
     let pixel = camera.project(ground)?;

@@ -1,7 +1,8 @@
 //! Satellite surface models from RPC images, and building priors from city models.
 //!
-//! This crate is a facade: it re-exports the crates of the toolkit under one name. Each crate holds
-//! one subject and documents its units, frames and sources.
+//! [`prelude`] has the names that most programs need, and a promise of how they change. Below it
+//! this crate is a facade: it re-exports the crates of the toolkit under one name. Each crate holds
+//! one subject and documents its units, frames and sources; it may change in any version.
 //!
 //! # Jobs
 //! [`jobs`] is what most programs need. Every job is a function from a configuration to a report,
@@ -14,6 +15,12 @@
 //! | [`jobs::products`] | point clouds and what else people open beside a surface model |
 //! | [`jobs::eval`] | errors of a surface model against a reference |
 //! | [`jobs::buildings`] | an index of buildings in one image |
+//! | [`jobs::classes`] | ground, buildings and vegetation of a surface model |
+//! | [`jobs::diff`] | changes between two surface models, with volumes |
+//! | [`jobs::register`] | the pointing of a new image, corrected against a surface model or splats |
+//! | [`jobs::production`], [`jobs::batch`] | surface models in parts and in several processes; many scenes and tasks |
+//! | [`jobs::tiles`] | training tiles around cameras |
+//! | [`jobs::view`] | a local page that shows the rasters of a run |
 //! | [`jobs::ortho`] | true orthophotos, with hidden cells marked |
 //! | [`jobs::heightmap`] | bird's-eye height maps around a camera |
 //! | [`jobs::groundview`] | depths, normals and sky of cameras on the ground |
@@ -51,6 +58,8 @@
 //! assert!((camera.gsd_at(pixel, 100.0)?.mean_m() - 0.5).abs() < 0.1);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
+
+pub mod prelude;
 
 pub use buildings;
 pub use bvh;
