@@ -17,8 +17,9 @@ use super::wall::Walls;
 /// 0.5 m is a wall.
 pub const STEP_SLOPE: f32 = 1.6;
 
-/// Side of the blocks whose highest cell is kept.
-const BLOCK: usize = 16;
+/// Sides of the blocks whose highest cell is kept, cells: the large ones pass over flat country, the
+/// small ones between buildings.
+const BLOCKS: [usize; 2] = [16, 4];
 /// Steps of the line of sight per cell.
 const STEPS_PER_CELL: f64 = 8.0;
 /// Substeps of a step near the surface.
@@ -29,26 +30,16 @@ const PARTS: u32 = 8;
 pub struct OcclusionSurface<'a> {
     heights: &'a Grid<f32>,
     walls: Walls,
-    /// The highest cell of each block and of one cell around it.
-    ceilings: Grid<f32>,
+    /// The highest cell of each block and of one cell around it, for each size of blocks.
+    ceilings: [Grid<f32>; 2],
     highest: f32,
 }
 
 impl<'a> OcclusionSurface<'a> {
     /// Prepares heights (metres, NaN where there is none) on cells of `cell_m` metres.
     pub fn new(heights: &'a Grid<f32>, cell_m: f64) -> Self {
-        let blocks = |cells: usize| cells.div_ceil(BLOCK).max(1);
-        let mut ceilings = Grid::filled(blocks(heights.width()), blocks(heights.height()), f32::NEG_INFINITY);
-        for j in 0..ceilings.height() {
-            let rows = (j * BLOCK).saturating_sub(1)..(j * BLOCK + BLOCK + 1).min(heights.height());
-            for i in 0..ceilings.width() {
-                let columns = (i * BLOCK).saturating_sub(1)..(i * BLOCK + BLOCK + 1).min(heights.width());
-                let cells = rows.clone().flat_map(|row| &heights.row(row)[columns.clone()]);
-                // f32::max ignores NaN.
-                ceilings[(i, j)] = cells.fold(f32::NEG_INFINITY, |high, &h| high.max(h));
-            }
-        }
-        let highest = ceilings.data().iter().fold(f32::NEG_INFINITY, |high, &h| high.max(h));
+        let ceilings = BLOCKS.map(|side| ceilings(heights, side));
+        let highest = ceilings[0].data().iter().fold(f32::NEG_INFINITY, |high, &h| high.max(h));
         Self { heights, walls: Walls::find(heights, STEP_SLOPE * cell_m as f32), ceilings, highest }
     }
 
@@ -151,9 +142,12 @@ impl<'a> OcclusionSurface<'a> {
             if !(line - rise < top && c > -0.5 && r > -0.5 && c < width - 0.5 && r < height - 0.5) {
                 return false;
             }
-            let (i, j) = ((c + 0.5) as usize / BLOCK, (r + 0.5) as usize / BLOCK);
-            if f64::from(self.ceilings[(i, j)]) - tolerance_m <= line - rise {
-                k += steps_out([c, r], step, [i, j]);
+            let cell = [(c + 0.5) as usize, (r + 0.5) as usize];
+            let below = |(side, ceilings): &(usize, &Grid<f32>)| {
+                f64::from(ceilings[(cell[0] / side, cell[1] / side)]) - tolerance_m <= line - rise
+            };
+            if let Some((side, _)) = BLOCKS.into_iter().zip(&self.ceilings).find(below) {
+                k += steps_out([c, r], step, cell, side);
                 continue;
             }
             let surface = |c: f64, r: f64, level: f64| {
@@ -194,13 +188,29 @@ impl Quad {
     }
 }
 
-/// Whole steps that lead out of a block, at least one.
+/// Returns the highest cell of each block and of one cell around it.
+fn ceilings(heights: &Grid<f32>, side: usize) -> Grid<f32> {
+    let blocks = |cells: usize| cells.div_ceil(side).max(1);
+    let mut ceilings = Grid::filled(blocks(heights.width()), blocks(heights.height()), f32::NEG_INFINITY);
+    for j in 0..ceilings.height() {
+        let rows = (j * side).saturating_sub(1)..(j * side + side + 1).min(heights.height());
+        for i in 0..ceilings.width() {
+            let columns = (i * side).saturating_sub(1)..(i * side + side + 1).min(heights.width());
+            let cells = rows.clone().flat_map(|row| &heights.row(row)[columns.clone()]);
+            // f32::max ignores NaN.
+            ceilings[(i, j)] = cells.fold(f32::NEG_INFINITY, |high, &h| high.max(h));
+        }
+    }
+    ceilings
+}
+
+/// Whole steps that lead out of the block of a cell, at least one.
 #[inline]
-fn steps_out(at: [f64; 2], step: [f64; 2], block: [usize; 2]) -> f64 {
+fn steps_out(at: [f64; 2], step: [f64; 2], cell: [usize; 2], side: usize) -> f64 {
     let along = |i: usize| {
-        let low = (block[i] * BLOCK) as f64 - 0.5;
-        let side = if step[i] > 0.0 { low + BLOCK as f64 } else { low };
-        if step[i] == 0.0 { f64::INFINITY } else { (side - at[i]) / step[i] }
+        let low = (cell[i] / side * side) as f64 - 0.5;
+        let edge = if step[i] > 0.0 { low + side as f64 } else { low };
+        if step[i] == 0.0 { f64::INFINITY } else { (edge - at[i]) / step[i] }
     };
     along(0).min(along(1)).floor().max(1.0)
 }
