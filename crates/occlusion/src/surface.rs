@@ -269,7 +269,8 @@ mod tests {
                 heights[(c, r)] = h;
             }
             let surface = OcclusionSurface::new(&heights, 0.5);
-            let slow = OcclusionSurface { ceilings: surface.ceilings.map(|_| f32::INFINITY), ..surface.clone() };
+            let nowhere_below = surface.ceilings.clone().map(|blocks| blocks.map(|_| f32::INFINITY));
+            let slow = OcclusionSurface { ceilings: nowhere_below, ..surface.clone() };
             let from = f64::from(heights[(column, row)]);
             let ask = |s: &OcclusionSurface<'_>| s.hides(column as f64, row as f64, from, [dx, dy], 0.05);
             prop_assert_eq!(ask(&surface), ask(&slow));
