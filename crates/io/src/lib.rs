@@ -12,6 +12,7 @@ pub mod citymodel;
 pub mod colmap;
 pub mod coloured_mesh;
 pub mod control;
+mod geoparquet;
 mod gltf;
 pub mod ground_points;
 mod lines;
