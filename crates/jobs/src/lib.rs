@@ -41,6 +41,7 @@ pub mod rpc;
 mod run_folder;
 mod run_links;
 mod same_view;
+pub mod selftest;
 pub mod simulate;
 mod simulate_page;
 mod small_view;
