@@ -128,8 +128,11 @@ def main():
     def same(pixels):
         return pixels
 
-    def show(name, heights, transform, raised=0.0):
-        error = heights - on_grid(heights, transform, truth, truth_transform) + raised
+    def show(name, heights, transform):
+        expected = on_grid(heights, transform, truth, truth_transform)
+        rows, columns = np.nonzero(np.isfinite(expected))
+        known = slice(rows.min(), rows.max() + 1), slice(columns.min(), columns.max() + 1)
+        heights, error = heights[known], (heights - expected)[known]
         picture(name, heights, error)
         print(f"{name:10} median error {np.nanmedian(error):8.2f} m, void {np.mean(np.isnan(heights)):.0%}")
 
