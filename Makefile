@@ -12,6 +12,9 @@ STATIC := RUSTFLAGS='--cfg skysweep_static' CMAKE_TOOLCHAIN_FILE=$(CURDIR)/crate
 PACKAGES := libgdal-dev pkg-config libsqlite3-dev g++
 SKYSWEEP := target/release/skysweep
 TOWN := data-samples/town
+# What plugins.qgis.org wants to know of the plugin: where its source and its tracker are, and whom to write to.
+PLUGIN_HOME := https://example.org/skysweep
+PLUGIN_EMAIL := plugin@example.org
 DEMO := out/demo
 
 # Fails when Cargo is absent; sets MISSING to what else is needed to build.
@@ -95,9 +98,14 @@ lint: check ## format, clippy on every target (benches too), documentation; warn
 	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps
 
 plugin: ## the plugin for QGIS, in out/skysweep_qgis.zip
-	@mkdir -p out
-	rm -f out/skysweep_qgis.zip
-	python3 -c 'import shutil; shutil.make_archive("out/skysweep_qgis", "zip", "qgis", "skysweep")'
+	@rm -rf out/qgis out/skysweep_qgis.zip
+	mkdir -p out/qgis
+	cp -r qgis/skysweep out/qgis/
+	rm -rf out/qgis/skysweep/__pycache__
+	cp LICENSE-MIT out/qgis/skysweep/LICENSE
+	cp LICENSE-APACHE out/qgis/skysweep/
+	sed -i -e 's|https://example.org/skysweep|$(PLUGIN_HOME)|; s|plugin@example.org|$(PLUGIN_EMAIL)|' out/qgis/skysweep/metadata.txt
+	python3 -c 'import shutil; shutil.make_archive("out/skysweep_qgis", "zip", "out/qgis", "skysweep")'
 	echo "plugin         out/skysweep_qgis.zip"
 
 test-qgis: check ## the algorithms in an installed QGIS, without a window (not part of make test)

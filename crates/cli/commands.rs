@@ -19,6 +19,7 @@ pub(crate) mod production;
 pub(crate) mod products;
 pub(crate) mod register;
 pub(crate) mod rpc;
+pub(crate) mod selftest;
 pub(crate) mod simulate;
 pub(crate) mod splats;
 pub(crate) mod split;

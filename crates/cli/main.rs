@@ -21,7 +21,7 @@ use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use crate::commands::{
     align, batch, buildings, city, classes, completions, diff, dsm, dtm, eval, groundview, heightmap, mesh, ortho,
-    priors, production, products, register, rpc, simulate, splats, split, tiles, train, view,
+    priors, production, products, register, rpc, selftest, simulate, splats, split, tiles, train, view,
 };
 use crate::global::{Global, Outcome};
 
@@ -83,6 +83,8 @@ enum Command {
     Rpc(rpc::Command),
     /// Compute chunks of a planned run.
     Run(production::ChunkArgs),
+    /// Test whether this installation works, in a minute.
+    Selftest(selftest::Args),
     /// Make a scene seen through RPC cameras, with its exact surface.
     Simulate(simulate::Args),
     /// Make Gaussian splats of a surface model and its images.
@@ -144,8 +146,9 @@ fn run(cli: &Cli) -> anyhow::Result<Outcome> {
         Command::Priors(args) => priors::run(args, cli.global),
         Command::Products(args) => products::run(args, cli.global),
         Command::Register(args) => register::run(args, cli.global),
-        Command::Rpc(command) => rpc::run(command),
+        Command::Rpc(command) => rpc::run(command, cli.global),
         Command::Run(args) => production::run(args, cli.global),
+        Command::Selftest(args) => selftest::run(args, cli.global),
         Command::Simulate(args) => simulate::run(args, cli.global),
         Command::Splats(args) => splats::run(args, cli.global),
         Command::Train(args) => train::run(args, cli.global),

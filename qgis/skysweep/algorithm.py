@@ -19,6 +19,7 @@ from qgis.core import (
     QgsProcessingParameterEnum,
     QgsProcessingParameterExtent,
     QgsProcessingParameterFile,
+    QgsProcessingParameterFileDestination,
     QgsProcessingParameterFolderDestination,
     QgsProcessingParameterMultipleLayers,
     QgsProcessingParameterNumber,
@@ -51,6 +52,9 @@ def definition_of(described):
             name, label, types=[QgsProcessing.TypeVectorPolygon], **common
         ),
         "file": lambda: QgsProcessingParameterFile(name, label, **common),
+        "folder": lambda: QgsProcessingParameterFile(
+            name, label, behavior=QgsProcessingParameterFile.Folder, **common
+        ),
         "path": lambda: QgsProcessingParameterString(name, label, **common),
         "text": lambda: QgsProcessingParameterString(name, label, **common),
         "count": lambda: number(name, label, type=number.Integer, minValue=1, **common),
@@ -107,6 +111,10 @@ class SkysweepAlgorithm(QgsProcessingAlgorithm):
         if output["type"] == "raster":
             self.addParameter(QgsProcessingParameterRasterDestination(output["name"], output["label"]))
             return
+        if output["type"] == "filename":
+            name, label = output["name"], output["label"]
+            self.addParameter(QgsProcessingParameterFileDestination(name, label, fileFilter=output["filter"]))
+            return
         self.addParameter(QgsProcessingParameterFolderDestination(output["name"], output["label"]))
         self.addParameter(QgsProcessingParameterBoolean(LOAD, "Load the layers when done", defaultValue=True))
         kinds = {
@@ -126,6 +134,9 @@ class SkysweepAlgorithm(QgsProcessingAlgorithm):
             destination = self.parameterAsString(parameters, output["name"], context)
             if output["type"] == "raster":
                 destination = self.parameterAsOutputLayer(parameters, output["name"], context)
+            if output["type"] == "filename":
+                destination = self.parameterAsFileOutput(parameters, output["name"], context)
+            if output["type"] in ("raster", "filename"):
                 os.makedirs(os.path.dirname(destination) or ".", exist_ok=True)
             with_output = {**self.described, "parameters": [*self.described["parameters"], output]}
             arguments = arguments_of(with_output, {**values, output["name"]: destination})

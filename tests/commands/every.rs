@@ -4,4 +4,5 @@ mod batch;
 mod progress_options;
 mod refused_early;
 mod remote;
+mod selftest;
 mod view;

@@ -24,10 +24,63 @@ fn manual_pages_describe_a_command_and_its_subcommands() {
         Command::cargo_bin("skysweep").expect("the command is built").args(["man", "nothing"]).assert().code(2);
     let told = String::from_utf8_lossy(&refused.get_output().stderr).into_owned();
     assert!(told.contains("'nothing'") && told.contains("dsm"), "{told}");
+    // The names that the pages have in their titles and in the references of other pages.
+    let page = output_of(&["man", "splats", "render"]);
+    for name in ["splats-render", "skysweep-splats-render"] {
+        assert_eq!(output_of(&["man", name]), page, "{name}");
+    }
+    assert_eq!(output_of(&["man", "skysweep-dsm"]), output_of(&["man", "dsm"]));
+}
+
+/// What is mistyped is answered with the nearest name: commands, options, values, pages, presets of
+/// scenes and values of job files.
+#[test]
+fn slips_are_answered_with_the_nearest_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let job = folder.path().join("job.toml");
+    std::fs::write(&job, "images = []\noutput = 'out'\npreset = 'acurate'\n").unwrap();
+    let job = job.to_string_lossy().into_owned();
+    let slips: [(&[&str], &str); 8] = [
+        (&["dms"], "dsm"),
+        (&["splats", "rendr"], "render"),
+        (&["dsm", "a.tif", "b.tif", "-o", "out", "--presett", "fast"], "--preset"),
+        (&["dsm", "a.tif", "b.tif", "-o", "out", "--preset", "acurate"], "accurate"),
+        (&["products", "run", "--only", "cloud,contour"], "contours"),
+        (&["man", "ortoh"], "did you mean 'ortho'?"),
+        (&["simulate", "twon", "-o", "out"], "did you mean town?"),
+        (&["dsm", &job], "did you mean `accurate`?"),
+    ];
+    for (words, meant) in slips {
+        let refused = Command::cargo_bin("skysweep").unwrap().args(words).current_dir(folder.path()).assert().code(2);
+        let told = String::from_utf8_lossy(&refused.get_output().stderr).into_owned();
+        let is_suggested = told.contains(&format!("'{meant}'")) || told.contains(meant) && meant.contains(' ');
+        assert!(is_suggested && !folder.path().join("out").exists(), "{words:?}: {told}");
+    }
+}
+
+#[test]
+fn quiet_commands_print_errors_only() {
+    let town = concat!(env!("CARGO_MANIFEST_DIR"), "/data-samples/town");
+    let (view, truth) = (format!("{town}/view_1.tif"), format!("{town}/truth/dsm.tif"));
+    let other = format!("{town}/view_2.tif");
+    let city = format!("{town}/truth/buildings.city.json");
+    let commands: [&[&str]; 4] = [
+        &["rpc", "info", &view],
+        &["eval", &truth, &truth, "--no-report"],
+        &["city", "info", &city],
+        &["dsm", &view, &other, "--gsd", "2", "--preset", "fast", "--dry-run", "-o", "never"],
+    ];
+    for words in commands {
+        let printed = output_of(&[words, &["-q"]].concat());
+        assert_eq!(printed, "", "{words:?}");
+        if words[0] != "rpc" {
+            assert!(output_of(&[words, &["-q", "--json"]].concat()).starts_with('{'), "{words:?}");
+        }
+    }
 }
 
 /// Commands with options, as words of the command line.
-const COMMANDS: [&[&str]; 34] = [
+const COMMANDS: [&[&str]; 36] = [
     &["align"],
     &["batch"],
     &["buildings"],
@@ -52,7 +105,9 @@ const COMMANDS: [&[&str]; 34] = [
     &["rpc", "project"],
     &["rpc", "localize"],
     &["rpc", "convert"],
+    &["rpc", "export"],
     &["run"],
+    &["selftest"],
     &["simulate"],
     &["splats"],
     &["splats", "render"],

@@ -61,6 +61,47 @@ fn every_option_and_choice_of_the_plugin_exists() {
     }
 }
 
+/// What plugins.qgis.org refuses a plugin without, and every command with a result of its own.
+#[test]
+fn the_plugin_is_described_and_runs_every_job() {
+    let metadata = std::fs::read_to_string(plugin().join("skysweep/metadata.txt")).unwrap();
+    let wanted = ["name", "description", "about", "version", "qgisMinimumVersion", "author", "email", "repository"];
+    for key in wanted.into_iter().chain(["tracker", "homepage", "icon", "tags", "category"]) {
+        let value = metadata.lines().find_map(|line| line.strip_prefix(key)?.strip_prefix('='));
+        assert!(value.is_some_and(|value| !value.trim().is_empty()), "{key} is missing in metadata.txt");
+    }
+    let commands: Vec<String> = algorithms()
+        .iter()
+        .map(|algorithm| {
+            let words = algorithm["command"].as_array().unwrap().iter();
+            words.map(|word| word.as_str().unwrap()).collect::<Vec<_>>().join(" ")
+        })
+        .collect();
+    for job in [
+        "align",
+        "buildings",
+        "classes",
+        "diff",
+        "dsm",
+        "dtm",
+        "eval",
+        "groundview",
+        "heightmap",
+        "mesh",
+        "ortho",
+        "priors",
+        "products",
+        "register",
+        "rpc export",
+        "simulate",
+        "splats",
+        "tiles",
+        "train",
+    ] {
+        assert!(commands.iter().any(|command| command == job), "no algorithm runs skysweep {job}");
+    }
+}
+
 #[test]
 fn the_plugin_runs_the_command() {
     let Ok(version) = Command::new("python3").arg("--version").output() else {

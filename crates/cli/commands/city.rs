@@ -79,8 +79,7 @@ fn info(args: &InfoArgs, global: Global) -> anyhow::Result<Outcome> {
     let summary =
         args.input.write.show.watch(global, file, |watcher| jobs::city::info(&config, watcher)).map_err(hinted)?;
     tell(&summary);
-    // The text is the only result.
-    args.input.write.show.print(Global { quiet: false, ..global }, &summary, || summary.text())?;
+    args.input.write.show.print(global, &summary, || summary.text())?;
     Ok(outcome(&summary))
 }
 

@@ -219,8 +219,7 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
     if args.dry_run {
         let plan = args.show.watch(global, &config.output, |watcher| make_plan(&config, watcher));
         let plan = plan.map_err(production_hinted)?;
-        // The text is the only result.
-        args.show.print(Global { quiet: false, ..global }, &plan, || plan.text())?;
+        args.show.print(global, &plan, || plan.text())?;
         return Ok(Outcome::Complete);
     }
     let report = args.show.watch(global, &config.output, |watcher| jobs::dsm::run(&config, watcher)).map_err(hinted)?;

@@ -106,6 +106,9 @@ pub(crate) struct Args {
     /// names another threshold.
     #[arg(long, value_name = "[T=]SHARE", value_delimiter = ',')]
     min_completeness: Vec<MinCompleteness>,
+    /// Worker threads [default: all cores].
+    #[arg(long, value_name = "N")]
+    threads: Option<usize>,
     #[command(flatten)]
     surface: SurfaceArgs,
 }
@@ -199,9 +202,7 @@ fn grids(args: &Args, global: Global) -> anyhow::Result<Vec<String>> {
     let has_none = report.report_page.is_none() && report.report_failure.is_none();
     let is_news = has_none && args.html.is_none() && !args.no_report;
     let hint = if is_news { "report     none; -o DIR writes one (page, JSON, error map)\n" } else { "" };
-    let files = if global.is_quiet() { String::new() } else { report.files() + hint };
-    // The table is the result, and no message.
-    args.show.print(Global { quiet: false, ..global }, &report, || report.table() + &files)?;
+    args.show.print(global, &report, || report.table() + report.files().as_str() + hint)?;
     Ok(report.missed().to_vec())
 }
 
@@ -229,6 +230,7 @@ fn grid_config(args: &Args) -> GridEvalConfig {
     };
     config.page = args.html.clone();
     config.error_map = args.error_map.clone();
+    config.threads = args.threads;
     config.overwrite = args.overwrite;
     config.requirements = requirements(args);
     config
@@ -238,9 +240,8 @@ fn grid_config(args: &Args) -> GridEvalConfig {
 fn surfaces(args: &Args, global: Global) -> anyhow::Result<Vec<String>> {
     refuse_grid_options(args, "surfaces")?;
     let report = watch(args, global, |watcher| jobs::eval::evaluate_surfaces(&surface_config(args), watcher))?;
-    let written = report.written.as_ref().filter(|_| !global.is_quiet());
-    let files = written.map(|path| format!("report     {}\n", path.display())).unwrap_or_default();
-    args.show.print(Global { quiet: false, ..global }, &report, || report.table() + &files)?;
+    let files = report.written.as_ref().map(|path| format!("report     {}\n", path.display())).unwrap_or_default();
+    args.show.print(global, &report, || report.table() + &files)?;
     Ok(report.missed().to_vec())
 }
 
@@ -262,6 +263,7 @@ fn surface_config(args: &Args) -> SurfaceEvalConfig {
     config.test_vertical = args.test_vertical;
     config.reference_vertical = args.ref_vertical;
     config.output = args.output.clone();
+    config.threads = args.threads;
     config.overwrite = args.overwrite;
     config.requirements = requirements(args);
     config
@@ -275,8 +277,9 @@ fn maps(args: &Args, global: Global) -> anyhow::Result<Vec<String>> {
     let mut config = MapEvalConfig::new(args.test.clone(), args.reference.clone());
     config.kind = args.maps;
     config.max_mae = args.max_mae;
+    config.threads = args.threads;
     let report = watch(args, global, |watcher| jobs::eval::compare_maps(&config, watcher))?;
-    args.show.print(Global { quiet: false, ..global }, &report, || report.table())?;
+    args.show.print(global, &report, || report.table())?;
     Ok(report.missed)
 }
 

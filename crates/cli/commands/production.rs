@@ -64,9 +64,10 @@ pub(crate) struct TemplateArgs {
     template: &'static str,
 }
 
-const TEMPLATES: [Named<&str>; 2] = [
+const TEMPLATES: [Named<&str>; 3] = [
     ("dsm", jobs::dsm::job_file::DSM_TEMPLATE, "A surface model: skysweep dsm JOB.toml"),
     ("batch", jobs::batch::BATCH_TEMPLATE, "Many scenes: skysweep batch BATCH.toml"),
+    ("study", jobs::batch::STUDY_TEMPLATE, "One patch with several settings: skysweep batch STUDY.toml"),
 ];
 
 /// Runs `skysweep plan`.

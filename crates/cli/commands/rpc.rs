@@ -11,20 +11,20 @@ use camera::ImagePoint;
 use geodesy::LonLatHeight;
 use io::rpc::RpcFormat;
 use jobs::rpc::{
-    RpcConvertConfig, RpcDirection, RpcInfoConfig, RpcJobError, RpcLineAnswer, RpcLinesConfig, RpcPointsConfig,
-    RpcQuery,
+    RpcConvertConfig, RpcDirection, RpcExportConfig, RpcInfoConfig, RpcJobError, RpcLineAnswer, RpcLinesConfig,
+    RpcPointsConfig, RpcQuery,
 };
 
 use crate::error::with_hint;
 use crate::options::named;
-use crate::progress::Log;
-use crate::{Outcome, print};
+use crate::progress::{Log, WriteOptions};
+use crate::{Global, Outcome, print};
 
 /// The commands of `skysweep rpc`.
 #[derive(Debug, clap::Subcommand)]
 pub(crate) enum Command {
-    /// Show the RPC of a file: format, offsets and scales, validity box, ground sampling distance,
-    /// viewing angles.
+    /// Show the RPC of a file and its image: size, bands, date, satellite, sun, footprint, format,
+    /// offsets and scales, validity box, ground sampling distance, viewing angles.
     Info(InfoArgs),
     /// Project ground points into the image.
     Project(ProjectArgs),
@@ -32,6 +32,8 @@ pub(crate) enum Command {
     Localize(LocalizeArgs),
     /// Write the RPC in another format.
     Convert(ConvertArgs),
+    /// Write images and cameras as a dataset in the layout of Sat-NeRF, which EOGS reads too.
+    Export(ExportArgs),
 }
 
 #[derive(Debug, clap::Args)]
@@ -105,20 +107,49 @@ pub(crate) struct ConvertArgs {
     overwrite: bool,
 }
 
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Of a run, the images are cut to the ground of its surface model, the RPCs include its pointing \
+                  corrections, and the heights are those of the surface. The trainers then read DIR/cameras as the \
+                  folder of the cameras and DIR/images as that of the images."
+)]
+pub(crate) struct ExportArgs {
+    /// Folder of a run of skysweep dsm, or images with RPCs, their folder, or a quoted pattern.
+    #[arg(value_name = "RUN|IMAGE", required = true)]
+    inputs: Vec<PathBuf>,
+    /// Folder for the dataset.
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+    /// Lowest and highest height of the scene above the ellipsoid, metres [default: those of the
+    /// surface model of the run].
+    #[arg(long, num_args = 2, value_names = ["LO", "HI"], allow_negative_numbers = true)]
+    height_range: Vec<f64>,
+    /// Keep every Nth image for tests, from the first one by name; 0 keeps none.
+    #[arg(long, value_name = "N", default_value_t = 8)]
+    hold_out: usize,
+    /// Where the sun stood in images that do not say: its azimuth, clockwise from north, and its
+    /// elevation, degrees.
+    #[arg(long, num_args = 2, value_names = ["AZIMUTH", "ELEVATION"])]
+    sun: Vec<f64>,
+    #[command(flatten)]
+    write: WriteOptions,
+}
+
 /// Runs `skysweep rpc`.
-pub(crate) fn run(command: &Command) -> anyhow::Result<Outcome> {
+pub(crate) fn run(command: &Command, global: Global) -> anyhow::Result<Outcome> {
     match command {
-        Command::Info(args) => info(args),
+        Command::Info(args) => info(args, global),
         Command::Project(args) => project(args),
         Command::Localize(args) => localize(args),
         Command::Convert(args) => convert(args),
+        Command::Export(args) => export(args, global),
     }
 }
 
-fn info(args: &InfoArgs) -> anyhow::Result<Outcome> {
+fn info(args: &InfoArgs, global: Global) -> anyhow::Result<Outcome> {
     let report = jobs::rpc::info(&RpcInfoConfig::new(args.file.clone()), &Log)?;
     tracing::info!("{}: {}", report.source, report.format);
-    print::report(args.json, true, &report, || report.text())?;
+    print::report(args.json, !global.is_quiet(), &report, || report.text())?;
     Ok(Outcome::Complete)
 }
 
@@ -135,6 +166,26 @@ fn convert(args: &ConvertArgs) -> anyhow::Result<Outcome> {
         with_hint(error, hint)
     })?;
     tracing::info!("{}: {}", report.source.display(), report.source_format);
+    Ok(Outcome::Complete)
+}
+
+fn export(args: &ExportArgs, global: Global) -> anyhow::Result<Outcome> {
+    let mut config = RpcExportConfig::new(args.inputs.clone(), args.output.clone());
+    config.height_range_m = args.height_range.first_chunk().copied();
+    config.hold_out = args.hold_out;
+    config.sun_deg = args.sun.first_chunk().copied();
+    config.overwrite = args.write.overwrite;
+    let watched = args.write.show.watch(global, &args.output, |watcher| jobs::rpc::export(&config, watcher));
+    let report = watched.map_err(|error| {
+        let hint = match &error {
+            RpcJobError::NoHeights => Some("give --height-range LO HI"),
+            RpcJobError::NoSun { .. } => Some("give --sun AZIMUTH ELEVATION"),
+            RpcJobError::NotEmpty { .. } => Some("choose another folder or pass --overwrite"),
+            _ => None,
+        };
+        with_hint(error, hint)
+    })?;
+    args.write.show.print(global, &report, || report.text())?;
     Ok(Outcome::Complete)
 }
 

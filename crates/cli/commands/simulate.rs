@@ -11,7 +11,7 @@ use ::simulate::{PRESETS, SeasonsConfig, SimulationConfig};
 use jobs::simulate::{SimulateConfig, SimulateJobError};
 
 use crate::error::with_hint;
-use crate::progress::{ProgressStyle, ShowOptions};
+use crate::progress::RunOptions;
 use crate::{Global, Outcome, print};
 
 /// Arguments of `skysweep simulate`.
@@ -64,12 +64,8 @@ pub(crate) struct Args {
     /// Folder for the images and the truth.
     #[arg(short, long, value_name = "DIR", required_unless_present_any = ["list", "template"])]
     output: Option<PathBuf>,
-    /// Replace the files of an earlier simulation.
-    #[arg(long)]
-    overwrite: bool,
-    /// How progress is shown.
-    #[arg(long, value_name = "STYLE", value_enum, default_value = "bar")]
-    progress: ProgressStyle,
+    #[command(flatten)]
+    run: RunOptions,
     /// List the presets and stop.
     #[arg(long)]
     list: bool,
@@ -122,8 +118,9 @@ fn made(scene: SimulationConfig, args: &Args, output: &Path, global: Global) -> 
     config.flight = args.flight;
     config.flight_arc_deg = args.flight_arc.first_chunk().copied();
     config.flight_spacing_m = args.flight_spacing;
-    config.overwrite = args.overwrite;
-    let show = ShowOptions { progress: args.progress, json: false };
+    config.threads = args.run.threads;
+    config.overwrite = args.run.overwrite;
+    let show = args.run.show;
     let report = show.watch(global, output, |watcher| jobs::simulate::run(&config, watcher)).map_err(|error| {
         let full = matches!(error, SimulateJobError::NotEmpty { .. });
         with_hint(error, full.then_some("choose another folder or pass --overwrite"))

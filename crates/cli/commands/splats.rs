@@ -12,7 +12,7 @@ use splats::DivisionConfig;
 use crate::corrections::corrections_of;
 use crate::error::with_hint;
 use crate::options::{Named, named};
-use crate::progress::WriteOptions;
+use crate::progress::RunOptions;
 use crate::{Global, Outcome};
 
 /// Arguments of `skysweep splats`.
@@ -91,7 +91,7 @@ struct MakeArgs {
     #[arg(long, value_name = "DIR")]
     render: Option<PathBuf>,
     #[command(flatten)]
-    write: WriteOptions,
+    run: RunOptions,
 }
 
 /// Whether splats are discs.
@@ -127,7 +127,7 @@ struct RenderArgs {
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
     #[command(flatten)]
-    write: WriteOptions,
+    run: RunOptions,
 }
 
 /// Arguments of `skysweep splats convert`.
@@ -149,7 +149,7 @@ struct ConvertArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=3))]
     sh_degree: Option<u8>,
     #[command(flatten)]
-    write: WriteOptions,
+    run: RunOptions,
 }
 
 /// Runs `skysweep splats`.
@@ -176,8 +176,9 @@ fn make(args: &MakeArgs, dsm: &Path, output: &Path, global: Global) -> anyhow::R
     config.compare = args.compare;
     config.report.clone_from(&args.report);
     config.renderings.clone_from(&args.render);
-    config.overwrite = args.write.overwrite;
-    let show = args.write.show;
+    config.threads = args.run.threads;
+    config.overwrite = args.run.overwrite;
+    let show = args.run.show;
     let report = show.watch(global, output, |watcher| jobs::splats::make(&config, watcher)).map_err(hinted)?;
     show.print(global, &report.to_json()?, || report.text())?;
     Ok(Outcome::Complete)
@@ -190,13 +191,11 @@ fn render(args: &RenderArgs, global: Global) -> anyhow::Result<Outcome> {
     config.shrink = args.shrink;
     config.pictures.clone_from(&args.pictures);
     config.corrections = corrections_of(args.corrections.as_deref());
-    config.overwrite = args.write.overwrite;
-    let report = args
-        .write
-        .show
-        .watch(global, &args.output, |watcher| jobs::splats::render(&config, watcher))
-        .map_err(hinted)?;
-    args.write.show.print(global, &report, || report.text(&args.output))?;
+    config.threads = args.run.threads;
+    config.overwrite = args.run.overwrite;
+    let report =
+        args.run.show.watch(global, &args.output, |watcher| jobs::splats::render(&config, watcher)).map_err(hinted)?;
+    args.run.show.print(global, &report, || report.text(&args.output))?;
     Ok(Outcome::Complete)
 }
 
@@ -204,8 +203,9 @@ fn convert(args: &ConvertArgs, global: Global) -> anyhow::Result<Outcome> {
     let mut config = SplatConvertConfig::new(args.splats.clone(), args.output.clone());
     config.discs = args.form;
     config.sh_degree = args.sh_degree;
-    config.overwrite = args.write.overwrite;
-    let show = args.write.show;
+    config.threads = args.run.threads;
+    config.overwrite = args.run.overwrite;
+    let show = args.run.show;
     let report = show.watch(global, &args.output, |watcher| jobs::splats::convert(&config, watcher)).map_err(hinted)?;
     show.print(global, &report, || report.text(&args.output))?;
     Ok(Outcome::Complete)

@@ -54,8 +54,7 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
     let output = args.output.as_deref();
     let written = output.unwrap_or(Path::new(""));
     let report = args.write.show.watch(global, written, |watcher| jobs::split::run(&config(args), watcher))?;
-    // Without a file the text is the only result.
-    args.write.show.print(Global { quiet: global.quiet && output.is_some(), ..global }, &report, || report.text())?;
+    args.write.show.print(global, &report, || report.text())?;
     Ok(Outcome::Complete)
 }
 

@@ -66,6 +66,7 @@ mod tests {
             ("images = 3", "invalid type: integer `3`, expected a sequence (line 1)"),
             ("output = 'a'", "missing field `images`"),
             ("images = []\npreset = 'slow'", "(line 2)"),
+            ("images = []\npreset = 'acurate'", "did you mean `accurate`? (line 2)"),
             ("images = [", "(line 1)"),
         ] {
             let error = job(text).unwrap_err().to_string();

@@ -1,5 +1,5 @@
-//! Areas: the polygons of a GeoPackage, a shapefile or a GeoJSON file, and writing polygons as
-//! GeoJSON.
+//! Areas: the polygons of a GeoPackage, a shapefile, a GeoParquet or a GeoJSON file, and writing
+//! polygons as GeoJSON.
 //!
 //! A GeoJSON file is in longitude and latitude (RFC 7946) unless it names another system in the way
 //! of older files.
@@ -12,6 +12,7 @@ use geo::{Coord, CoordsIter, LineString, MultiPolygon, Polygon};
 use serde_json::{Value, json};
 
 use crate::atomic::{SaveError, write_stream};
+use crate::geoparquet;
 use crate::raster::{VectorFormat, prepare_gdal, register_vector, with_gdal};
 use crate::regular::read_regular;
 
@@ -59,8 +60,8 @@ pub struct AreaError {
     pub what: String,
 }
 
-/// Reads the area of a name, or all areas, from a GeoPackage (`.gpkg`), a shapefile (`.shp`) or a
-/// GeoJSON file.
+/// Reads the area of a name, or all areas, from a GeoPackage (`.gpkg`), a shapefile (`.shp`), a
+/// GeoParquet file (`.parquet`) or a GeoJSON file.
 ///
 /// ```
 /// # let folder = tempfile::tempdir()?;
@@ -169,10 +170,9 @@ fn layer(path: &Path, wanted: AreaName<'_>) -> Result<(String, Vec<Feature>), St
     match ending.as_deref() {
         Some("gpkg") => through_gdal(path, VectorFormat::GeoPackage, wanted),
         Some("shp") => through_gdal(path, VectorFormat::Shapefile, wanted),
-        Some("parquet") => {
-            Err("GeoParquet is not read: write it as GeoPackage (ogr2ogr out.gpkg in.parquet), or give it \
-                                to Python as a GeoDataFrame (geopandas.read_parquet)"
-                .to_owned())
+        Some("parquet" | "geoparquet") => {
+            let (crs, features) = geoparquet::read(path, wanted.field)?;
+            Ok((crs, features.into_iter().map(|(name, polygons)| Feature { name, polygons }).collect()))
         }
         _ => geojson(path, wanted),
     }
@@ -359,7 +359,20 @@ mod tests {
         std::fs::remove_file(folder.path().join("areas.prj")).unwrap();
         let told = read(&path, AreaName::ALL).unwrap_err().to_string();
         assert!(told.contains(".prj beside it"), "{told}");
-        let told = read(&folder.path().join("a.parquet"), AreaName::ALL).unwrap_err().to_string();
+    }
+
+    #[test]
+    fn geoparquet_gives_its_polygons_and_its_map() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/areas.parquet");
+        let area = read(&path, named(None, "south")).unwrap();
+        assert_eq!((area.crs.as_str(), area.polygons.0.len()), ("EPSG:32631", 2));
+        assert_eq!(read(&path, AreaName::ALL).unwrap().polygons.0.len(), 3);
+        let told = read(&path, named(None, "nrth")).unwrap_err().to_string();
+        assert!(told.contains("there are north, south"), "{told}");
+        let folder = tempfile::tempdir().unwrap();
+        let broken = folder.path().join("a.parquet");
+        std::fs::write(&broken, "PAR1").unwrap();
+        let told = read(&broken, AreaName::ALL).unwrap_err().to_string();
         assert!(told.contains("write it as GeoPackage"), "{told}");
     }
 

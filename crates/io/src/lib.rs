@@ -11,6 +11,7 @@ pub mod camera_file;
 pub mod colmap;
 pub mod coloured_mesh;
 pub mod control;
+mod geoparquet;
 pub mod gltf;
 pub mod ground_points;
 pub mod lines;

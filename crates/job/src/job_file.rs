@@ -7,6 +7,7 @@
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 
+use numeric::nearest_name;
 use serde::de::DeserializeOwned;
 
 use crate::files::{FileError, read_text};
@@ -108,34 +109,17 @@ pub fn defect(message: &str, line: usize, path: &Path) -> JobFileError {
         && let Some(key) = quoted.next()
     {
         let known: Vec<String> = quoted.collect();
-        let nearest = nearest(&key, &known).map(str::to_owned);
+        let nearest = nearest_name(&key, known.iter().map(String::as_str)).map(str::to_owned);
         return JobFileError::UnknownKey { path, line, key, nearest, known };
     }
-    JobFileError::Invalid { path, line, what: message.trim().replace('\n', " ") }
-}
-
-/// Returns the known name that is most like `name`; `None` where none is.
-pub fn nearest<'a>(name: &str, known: &'a [String]) -> Option<&'a str> {
-    let name = name.to_ascii_lowercase();
-    // A key without its unit, or with more words, is a likely slip.
-    let is_part = |other: &str| name.len() >= 3 && (other.starts_with(&name) || name.starts_with(other));
-    let distance = |other: &str| if is_part(other) { 1 } else { edits(&name, other) };
-    let best = known.iter().map(|other| (distance(other), other.as_str())).min()?;
-    (best.0 <= 2.max(name.len() / 3)).then_some(best.1)
-}
-
-/// Returns the number of letters to insert, remove or replace (Levenshtein).
-fn edits(a: &str, b: &str) -> usize {
-    let b: Vec<char> = b.chars().collect();
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, c) in a.chars().enumerate() {
-        let mut diagonal = row[0];
-        row[0] = i + 1;
-        for (j, d) in b.iter().enumerate() {
-            let replaced = diagonal + usize::from(c != *d);
-            diagonal = row[j + 1];
-            row[j + 1] = replaced.min(row[j] + 1).min(diagonal + 1);
+    let mut what = message.trim().replace('\n', " ");
+    if what.starts_with("unknown variant")
+        && let Some(value) = quoted.next()
+    {
+        let known: Vec<String> = quoted.collect();
+        if let Some(nearest) = nearest_name(&value, known.iter().map(String::as_str)) {
+            what += &format!("; did you mean `{nearest}`?");
         }
     }
-    row[b.len()]
+    JobFileError::Invalid { path, line, what }
 }

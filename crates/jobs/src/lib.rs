@@ -5,6 +5,7 @@
 //! `viewer`. What they share is in `job`. All of them are re-exported here.
 
 pub mod batch;
+pub mod selftest;
 
 pub use dsm::{self, production, products};
 pub use job::{

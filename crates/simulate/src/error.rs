@@ -19,7 +19,7 @@ pub enum SimulateError {
         high: f64,
     },
     /// No preset has this name.
-    #[error("no preset is called {found}: the presets are {}", names())]
+    #[error("no preset is called {found}: {}the presets are {}", meant(found), names())]
     UnknownPreset {
         /// The name.
         found: String,
@@ -39,6 +39,12 @@ pub enum SimulateError {
     /// No map projection is defined at the place of the scene.
     #[error("no map projection is defined at the place of the scene")]
     Geodesy(#[from] crs::CrsError),
+}
+
+/// Asks for the nearest name, where one is near.
+fn meant(found: &str) -> String {
+    let nearest = numeric::nearest_name(found, PRESETS.map(|(name, _)| name));
+    nearest.map(|name| format!("did you mean {name}? ")).unwrap_or_default()
 }
 
 fn names() -> String {

@@ -357,6 +357,29 @@ fn a_dry_run_says_what_is_done_and_one_scene_is_worked_on() {
     assert!(told.contains("which write the same folder"), "{told}");
 }
 
+/// The template of a study becomes a page with a picture and the errors of each way.
+#[test]
+fn a_study_compares_settings_on_a_patch() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("study.toml");
+    let template = String::from_utf8(skysweep().args(["template", "study"]).output().unwrap().stdout).unwrap();
+    let town = sample("").display().to_string();
+    let study = template
+        .replace("images/*.tif", &format!("{town}/view_[13].tif"))
+        .replace("693000.0, 4822000.0, 693400.0, 4822400.0", "693812.0, 4822332.0, 693912.0, 4822432.0")
+        .replace("\"reference.tif\"", &format!("\"{town}/truth/dsm.tif\""))
+        .replace("# gsd_m = 0.5", "gsd_m = 1.0");
+    std::fs::write(&file, study).unwrap();
+    let states = states(&run(&file, 0));
+    assert_eq!(states.len(), 8, "{states:?}");
+    assert!(states.iter().all(|(_, _, state, _)| state == "done"), "{states:?}");
+    let page = std::fs::read_to_string(folder.path().join("study/batch_report.html")).unwrap();
+    for name in ["fast", "balanced", "accurate", "only what was measured"] {
+        assert!(page.contains(name), "{name}");
+    }
+    assert!(page.matches("<img").count() >= 4, "each way has a picture");
+}
+
 /// A batch replaces what an earlier run of it made, and nothing else.
 #[test]
 fn results_that_the_batch_did_not_make_stay() {

@@ -178,3 +178,69 @@ fn usage_errors_have_exit_code_2_too() {
     skysweep(&folder()).args(["project", "a_RPC.TXT", "--lon", "7"]).assert().code(2);
     skysweep(&folder()).args(["unknown"]).assert().code(2);
 }
+
+/// The cameras of the dataset are those of the run, in cut images, and an earlier dataset goes.
+#[test]
+fn a_run_becomes_a_dataset_of_images_and_cameras() {
+    let folder = TempDir::new().unwrap();
+    let town = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("data-samples/town");
+    let views: Vec<_> = (1..=3).map(|view| town.join(format!("view_{view}.tif"))).collect();
+    let truth = io::raster::read_dem(town.join("truth/dsm.tif")).unwrap();
+    let (x, y) = truth.geotransform.map_from_cell(100.0, 300.0);
+    let bounds = [x, y, x + 60.0, y + 60.0].map(|side| format!("{side:.0}"));
+    let mut dsm = Command::cargo_bin("skysweep").unwrap();
+    dsm.current_dir(folder.path()).arg("dsm").args(&views).args(["-o", "run", "--gsd", "1", "--preset", "fast", "-q"]);
+    dsm.arg("--bounds").args(bounds).assert().success();
+
+    let refused = skysweep(&folder).args(["export", "run", "-o", "set"]).assert().code(2);
+    refused.stderr(predicate::str::contains("where the sun stood").and(predicate::str::contains("--sun")));
+    let export = |more: &[&str]| {
+        let mut command = skysweep(&folder);
+        command.args(["export", "run", "-o", "set", "--sun", "150", "50", "--hold-out", "3"]).args(more);
+        command.assert()
+    };
+    export(&[]).success().stdout(predicate::str::contains("1 are held out"));
+    let cameras = folder.path().join("set/cameras");
+    let read = |name: &str| std::fs::read_to_string(cameras.join(name)).unwrap();
+    assert_eq!((read("train.txt"), read("test.txt")), ("view_2.json\nview_3.json".into(), "view_1.json".into()));
+    let record: serde_json::Value = serde_json::from_str(&read("view_2.json")).unwrap();
+    let (low, high) = (record["min_alt"].as_f64().unwrap(), record["max_alt"].as_f64().unwrap());
+    assert_eq!((&record["sun_elevation"], &record["sun_azimuth"]), (&"+50".into(), &"150".into()));
+    assert!(high - low > 5.0 && low > 100.0, "{low} {high}");
+    let size = [&record["width"], &record["height"]].map(|side| side.as_u64().unwrap() as usize);
+    let image = io::raster::ImageSource::open(folder.path().join("set/images/view_2.tif")).unwrap();
+    assert_eq!(([image.info().width, image.info().height], image.info().bands), (size, 3));
+    assert!(size[0] < 400 && size[1] < 400, "the image is not cut: {size:?}");
+
+    // The camera of the file and that of the image see what the corrected camera sees.
+    let set: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(folder.path().join("set/dataset.json")).unwrap()).unwrap();
+    let origin = [0, 1].map(|axis| set["images"][1]["origin_px"][axis].as_f64().unwrap());
+    let camera = jobs::rpc::camera_of_run(&folder.path().join("run"), &views[1]).unwrap();
+    for file in [cameras.join("view_2.json"), folder.path().join("set/images/view_2.tif")] {
+        let rpc = io::rpc::read(&file).unwrap().rpc;
+        for (sample, line) in [(5.0, 5.0), (60.0, 80.0)] {
+            let ground = rpc.localize(camera::ImagePoint::new(sample, line), (low + high) / 2.0).unwrap();
+            let at = camera.project(ground).unwrap();
+            let off = (at.sample - origin[0] - sample).hypot(at.line - origin[1] - line);
+            assert!(off < 1e-3, "{}: {off}", file.display());
+        }
+    }
+
+    export(&[]).code(2).stderr(predicate::str::contains("not empty"));
+    std::fs::write(cameras.join("scene.loc"), "{}").unwrap();
+    export(&["--overwrite"]).success();
+    assert!(!cameras.join("scene.loc").exists(), "what the trainer made of earlier cameras is gone");
+    std::fs::write(cameras.join("notes.txt"), "mine").unwrap();
+    export(&["--overwrite"]).code(2).stderr(predicate::str::contains("notes.txt"));
+}
+
+#[test]
+fn info_tells_what_the_image_is() {
+    let view = concat!(env!("CARGO_MANIFEST_DIR"), "/data-samples/town/view_1.tif");
+    let said = predicate::str::contains("samples, ")
+        .and(predicate::str::contains("1 band"))
+        .and(predicate::str::contains("unknown: the file does not say"))
+        .and(predicate::str::contains("lower right"));
+    skysweep(&folder()).args(["info", view]).assert().success().stdout(said);
+}

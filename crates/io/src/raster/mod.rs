@@ -11,7 +11,7 @@ mod error;
 mod read;
 mod write;
 
-pub use access::gdal_setup::allow_remote;
+pub use access::gdal_setup::{allow_remote, raster_formats};
 pub use error::RasterError;
 pub use read::dem::{Dem, read_dem, read_dem_window};
 pub use read::luma::LumaTile;

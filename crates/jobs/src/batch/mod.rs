@@ -22,3 +22,6 @@ pub use task::{TaskKind, TaskSettings};
 
 /// A commented batch file with every key.
 pub const BATCH_TEMPLATE: &str = include_str!("batch.toml");
+
+/// A commented batch file that computes one patch with several settings.
+pub const STUDY_TEMPLATE: &str = include_str!("study.toml");

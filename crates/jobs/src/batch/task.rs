@@ -422,7 +422,8 @@ fn in_words(message: &str) -> String {
             format!("unknown key `{key}`; did you mean `{nearest}`?")
         }
         JobFileError::UnknownKey { key, known, .. } => format!("unknown key `{key}`; known are {}", known.join(", ")),
-        _ => message.trim().replace('\n', " "),
+        JobFileError::Invalid { what, .. } => what,
+        other => other.to_string(),
     }
 }
 

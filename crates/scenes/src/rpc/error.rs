@@ -7,7 +7,9 @@ use io::raster::RasterError;
 use io::rpc::{RpcReadError, RpcWriteError};
 
 use job::corrections::CorrectionsError;
-use job::error::from_steps;
+use job::error::{ImageInputError, JobError, SettingError, from_steps};
+use job::files::FileError;
+use job::image_files::ImageFilesError;
 
 /// An RPC job that could not be done.
 #[derive(Debug, thiserror::Error)]
@@ -72,12 +74,65 @@ pub enum RpcJobError {
     /// The receiver of the answers failed.
     #[error("cannot pass on the answers")]
     Output(#[source] std::io::Error),
+    /// A folder or a pattern gives no images.
+    #[error(transparent)]
+    Images(#[from] ImageFilesError),
+    /// There is no image to export.
+    #[error("no image was given, expected images with RPCs or the folder of a DSM run")]
+    NoImages,
+    /// The range of heights is not known.
+    #[error("the range of heights is not known: give it, or the folder of a DSM run with its surface model")]
+    NoHeights,
+    /// An image does not say where the sun stood.
+    #[error("the image does not say where the sun stood, which the dataset needs: {}", path.display())]
+    NoSun {
+        /// The image.
+        path: PathBuf,
+    },
+    /// An image does not show the ground of the surface model.
+    #[error("the image does not show the ground of the surface model: {}", path.display())]
+    Outside {
+        /// The image.
+        path: PathBuf,
+    },
+    /// An image is too large for a dataset.
+    #[error(
+        "the image has {} x {} pixels, expected at most 64 million: give the folder of a DSM run, whose ground the \
+         images are cut to: {}", size[0], size[1], path.display()
+    )]
+    TooLarge {
+        /// The image.
+        path: PathBuf,
+        /// Columns and rows.
+        size: [usize; 2],
+    },
+    /// Two images have one name.
+    #[error("two images are called {name}, expected different names, which name the files of the dataset")]
+    SameName {
+        /// The name without its ending.
+        name: String,
+    },
+    /// The output folder holds files.
+    #[error("the output folder is not empty: {}", path.display())]
+    NotEmpty {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// A camera of an image cannot be made.
+    #[error(transparent)]
+    Camera(#[from] ImageInputError),
+    /// A text of the dataset cannot be written.
+    #[error(transparent)]
+    Text(#[from] io::atomic::SaveError),
+    /// A setting or a file cannot be used.
+    #[error(transparent)]
+    Job(#[from] JobError),
     /// The job was cancelled.
     #[error(transparent)]
     Cancelled(#[from] numeric::Cancelled),
 }
 
-from_steps!(RpcJobError: Read(RpcReadError));
+from_steps!(RpcJobError: Read(RpcReadError), Job(FileError, SettingError));
 
 /// What is wrong with a line of points.
 #[derive(Debug, thiserror::Error)]

@@ -1,4 +1,5 @@
-//! Describing an RPC: offsets, validity box, ground sampling distance and viewing direction.
+//! Describing an RPC: offsets, validity box, ground sampling distance and viewing direction, and the
+//! image that it belongs to.
 //!
 //! The ground sampling distance and the viewing direction hold at the centre of the RPC's domain,
 //! at the height offset. The incidence is the angle at the ground between the vertical and the
@@ -13,6 +14,7 @@ use serde::{Deserialize, Serialize};
 
 use super::error::RpcJobError;
 use super::input;
+use super::pixels::{self, RpcPixels};
 use numeric::Progress;
 
 /// The file whose RPC is described.
@@ -36,6 +38,8 @@ pub struct RpcInfoReport {
     pub format: RpcFormat,
     /// Warnings of the reader, such as conventions that it had to guess.
     pub warnings: Vec<String>,
+    /// The image, where the file holds one.
+    pub image: Option<RpcPixels>,
     /// The model.
     pub rpc: Rpc,
     /// Box on which the model was fitted.
@@ -102,6 +106,7 @@ pub fn info(config: &RpcInfoConfig, progress: &dyn Progress) -> Result<RpcInfoRe
         source: file.source.display().to_string(),
         format: file.format,
         warnings: file.warnings,
+        image: pixels::of_file(&config.file, &file.rpc),
         validity: validity(&file.rpc),
         centre: centre.ok(),
         rpc: file.rpc,

@@ -7,16 +7,21 @@
 
 mod convert;
 mod error;
+mod export;
+mod export_scene;
 mod info;
 mod input;
 mod lines;
 mod of_run;
+mod pixels;
 mod points;
 mod text;
 
 pub use convert::{RpcConvertConfig, RpcConvertReport, convert};
 pub use error::RpcJobError;
+pub use export::{RpcExportConfig, RpcExportReport, RpcExportedImage, export};
 pub use info::{RpcCentre, RpcInfoConfig, RpcInfoReport, RpcValidity, info};
 pub use lines::{RpcLineAnswer, RpcLinesConfig, RpcLinesReport, answer_lines, open_lines};
 pub use of_run::camera_of_run;
+pub use pixels::RpcPixels;
 pub use points::{RpcDirection, RpcPoint, RpcPointsConfig, RpcPointsReport, RpcQuery, points};

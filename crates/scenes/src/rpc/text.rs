@@ -6,6 +6,7 @@ use camera::ImagePoint;
 use geodesy::LonLatHeight;
 use serde_json::json;
 
+use super::pixels::RpcPixels;
 use super::{RpcDirection, RpcInfoReport, RpcLineAnswer, RpcPoint};
 
 impl RpcInfoReport {
@@ -21,6 +22,7 @@ impl RpcInfoReport {
         if self.source != self.file {
             row("source", self.source.clone());
         }
+        self.image.iter().flat_map(RpcPixels::rows).for_each(|(name, value)| row(name, value));
         for (name, off, scale, unit) in [
             ("line", rpc.line_off, rpc.line_scale, "px"),
             ("sample", rpc.samp_off, rpc.samp_scale, "px"),

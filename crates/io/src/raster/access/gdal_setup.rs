@@ -127,6 +127,15 @@ fn open_name(path: &Path, name: &Path) -> Result<Dataset, RasterError> {
         .map_err(|reason| RasterError::NotARaster { path: path.to_owned(), reason })
 }
 
+/// Returns GDAL's names of the formats that can be read or written here.
+pub fn raster_formats() -> Vec<String> {
+    prepare_gdal();
+    (0..DriverManager::count())
+        .filter_map(|index| DriverManager::get_driver(index).ok())
+        .map(|driver| driver.short_name())
+        .collect()
+}
+
 /// Lets the readers of rasters open addresses (`https://…`) for the rest of the process. Only the
 /// very name that it is given may be fetched, never one inside a file.
 pub fn allow_remote() {
