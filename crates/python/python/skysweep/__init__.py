@@ -25,6 +25,7 @@ from ._errors import DatumWarning as DatumWarning
 from ._errors import FileError as FileError
 from ._errors import FileMissingError as FileMissingError
 from ._errors import InputError as InputError
+from ._errors import InUseError as InUseError
 from ._errors import OutputExistsError as OutputExistsError
 from ._errors import SkysweepError as SkysweepError
 from ._evaluate import evaluate as evaluate
@@ -52,6 +53,7 @@ __all__ = [
     "FittedRpc",
     "HeightSweep",
     "Hits",
+    "InUseError",
     "InputError",
     "OutputExistsError",
     "Plan",
