@@ -185,24 +185,10 @@ impl Writer {
             let all: Vec<Typed> = values.map(|value| self.of(&value.ty, &[])).collect();
             return Typed::either(&all);
         }
-        let rule = option(&item.attrs, "rename_all");
-        let called = |v: &syn::Variant| {
-            option(&v.attrs, "rename").unwrap_or_else(|| cased(&v.ident.to_string(), rule.as_deref()))
-        };
-        let literal = |names: &[String]| {
-            let quoted: Vec<String> = names.iter().map(|name| format!("\"{name}\"")).collect();
-            Typed::plain(&format!("Literal[{}]", quoted.join(", ")))
-        };
-        if let Some(tag) = option(&item.attrs, "tag") {
-            let names: Vec<String> = item.variants.iter().map(called).collect();
-            return self.class(name, &docs(&item.attrs), |writer| {
-                let kind =
-                    Attributed { key: tag, typed: literal(&names), docs: "Which of them it is.".into(), absent: None };
-                let of_variants = item.variants.iter().flat_map(|v| writer.of_fields(&v.fields, rule.as_deref()));
-                std::iter::once(kind).chain(of_variants.map(may_be_absent)).collect()
-            });
+        if option(&item.attrs, "tag").is_some() {
+            return self.class(name, &docs(&item.attrs), |writer| writer.of_tagged(item));
         }
-        let plain: Vec<String> = item.variants.iter().filter(|v| v.fields.is_empty()).map(called).collect();
+        let plain: Vec<String> = item.variants.iter().filter(|v| v.fields.is_empty()).map(|v| called(item, v)).collect();
         let mut all = Vec::new();
         if !plain.is_empty() {
             all.push(literal(&plain));
@@ -219,10 +205,10 @@ impl Writer {
                         }
                         fields => {
                             let class = format!("{name}{}", v.ident);
-                            writer.class(&class, &docs(&v.attrs), |writer| writer.of_fields(fields, None))
+                            writer.class(&class, &docs(&v.attrs), |writer| writer.of_fields(fields))
                         }
                     };
-                    may_be_absent(Attributed { key: called(v), typed, docs: docs(&v.attrs), absent: None })
+                    may_be_absent(Attributed { key: called(item, v), typed, docs: docs(&v.attrs), absent: None })
                 });
                 attributes.collect()
             }));
@@ -230,12 +216,23 @@ impl Writer {
         Typed::either(&all)
     }
 
-    /// The attributes of the fields of a structure.
-    fn attributes(&mut self, item: &ItemStruct) -> Vec<Attributed> {
-        self.of_fields(&item.fields, None)
+    /// The attributes of an enumeration whose variants say which one they are.
+    fn of_tagged(&mut self, item: &ItemEnum) -> Vec<Attributed> {
+        let names: Vec<String> = item.variants.iter().map(|v| called(item, v)).collect();
+        let key = option(&item.attrs, "tag").expect("a tag");
+        let mut all = vec![Attributed { key, typed: literal(&names), docs: "Which of them it is.".into(), absent: None }];
+        for variant in &item.variants {
+            all.extend(self.of_fields(&variant.fields).into_iter().map(may_be_absent));
+        }
+        all
     }
 
-    fn of_fields(&mut self, fields: &Fields, _rule: Option<&str>) -> Vec<Attributed> {
+    /// The attributes of the fields of a structure.
+    fn attributes(&mut self, item: &ItemStruct) -> Vec<Attributed> {
+        self.of_fields(&item.fields)
+    }
+
+    fn of_fields(&mut self, fields: &Fields) -> Vec<Attributed> {
         let mut all = Vec::new();
         for field in fields.iter().filter(|field| !is_skipped(field)) {
             let options = serde(&field.attrs);
@@ -269,7 +266,10 @@ impl Writer {
         if let Some(item) = self.known.structs.get(&name).cloned() {
             return self.attributes(&item);
         }
-        panic!("{name} is flattened in a report, and is no structure that is written")
+        match self.known.enums.get(&name).cloned() {
+            Some(item) if option(&item.attrs, "tag").is_some() => self.of_tagged(&item),
+            _ => panic!("{name} is flattened in a report, and has no form in Python"),
+        }
     }
 
     /// A class, written once.
@@ -306,6 +306,16 @@ impl Writer {
         self.classes.insert(name.to_owned(), out);
         typed
     }
+}
+
+fn called(item: &ItemEnum, variant: &syn::Variant) -> String {
+    let rule = option(&item.attrs, "rename_all");
+    option(&variant.attrs, "rename").unwrap_or_else(|| cased(&variant.ident.to_string(), rule.as_deref()))
+}
+
+fn literal(names: &[String]) -> Typed {
+    let quoted: Vec<String> = names.iter().map(|name| format!("\"{name}\"")).collect();
+    Typed::plain(&format!("Literal[{}]", quoted.join(", ")))
 }
 
 fn is_skipped(field: &Field) -> bool {
