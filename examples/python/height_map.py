@@ -18,8 +18,13 @@ TOWN = Path(__file__).resolve().parents[2] / "data-samples" / "town"
 
 def main(output: str | None = None) -> None:
     path = Path(output or Path(tempfile.gettempdir()) / "skysweep_example_height_map.tif")
-    stand = {"source": {"position": {"lon_deg": 5.4, "lat_deg": 43.53}}, "heading_deg": 37.0}
-    skysweep.heightmap(TOWN / "truth" / "dsm.tif", path, stand, size_px=256, overwrite=True)
+    skysweep.heightmap(
+        TOWN / "truth" / "dsm.tif",
+        path,
+        {"source": {"position": {"lon_deg": 5.4, "lat_deg": 43.53}}, "heading_deg": 37.0},
+        size_px=256,
+        overwrite=True,
+    )
     heights = skysweep.read_raster(path).values
     print(f"{heights.shape[1]} × {heights.shape[0]} heights up to {np.nanmax(heights):.1f} m, in {path}")
 

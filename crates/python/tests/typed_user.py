@@ -27,7 +27,7 @@ def jobs() -> None:
 def every_job() -> list[float | int | str | None]:
     """All functions, with an attribute of each report whose type is known."""
     views = ["a.tif", "b.tif"]
-    place = {"source": {"position": {"lon_deg": 5.4, "lat_deg": 43.53}}}
+    place = {"lon_deg": 5.4, "lat_deg": 43.53}
     made = skysweep.dsm(views, "run")
     first: str = made.images[0].path
     kept: list[float | None] = made.surface.kept_by_image
@@ -55,9 +55,9 @@ def every_job() -> list[float | int | str | None]:
     surfaces = skysweep.evaluate_surfaces("a.ply", "b.ply")
     maps = skysweep.evaluate_maps("a.npy", "b.npy")
     kind: str = skysweep.kind_of_evaluation("a", "b")
-    heights = skysweep.heightmap("run", "map.tif", place)
+    heights = skysweep.heightmap("run", "map.tif", {"source": {"position": place}})
     points = skysweep.unproject("map.tif", "points.ply")
-    tiles = skysweep.tiles("run", "tiles", place)
+    tiles = skysweep.tiles("run", "tiles", {"source": {"position": place}})
     ground = skysweep.groundview("run", "views", {"model": "sparse/0"})
     both = skysweep.compose("ground.png", "alpha.png", "satellite.png", "both.png")
     priors = skysweep.priors("town.city.json", ["cameras"], "priors")

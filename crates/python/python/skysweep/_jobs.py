@@ -927,12 +927,16 @@ def merge_run(
 def batch(
     file: PathLike,
     *,
+    only: Sequence[str] = (),
+    dry_run: bool = False,
     progress: Progress = None,
 ) -> BatchReport:
     """Do the scenes and tasks that a batch file names.
 
     Args:
         file: Batch file (TOML).
+        only: Scenes to work on, by name; all when empty. The others are reported as they stand.
+        dry_run: Whether to say what would be done, and what would be refused, and do nothing.
         progress: `True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.
 
     Returns:

@@ -79,9 +79,8 @@ __all__ = [
     "GroundViewFailure",
     "GroundViewReport",
     "GroundViewRow",
-    "HeightMapList",
-    "HeightMapMade",
     "HeightMapRecord",
+    "HeightMapReport",
     "HeightMapTags",
     "Histogram",
     "ImageCharacter",
@@ -119,9 +118,8 @@ __all__ = [
     "PlanReport",
     "PointingReport",
     "PriorReport",
-    "PriorsDataset",
     "PriorsJobReport",
-    "PriorsMaps",
+    "PriorsProduct",
     "ProductsReport",
     "QuarterWeights",
     "ReferenceReport",
@@ -1990,76 +1988,6 @@ class GroundViewRow(Report):
     """Least and greatest depth, metres."""
 
 
-class HeightMapList(Report):
-    """Height maps for the rows of a list."""
-
-    rows: int
-    """Rows of the list."""
-
-    made: int
-    """Maps that were made now."""
-
-    kept: int
-    """Maps that an earlier run had made."""
-
-    failed: int
-    """Rows without a map."""
-
-    seconds: float
-    """Duration of the job, seconds."""
-
-    maps: list[HeightMapRecord]
-    """The rows, in the order of the list."""
-
-    _parts = {"maps": "HeightMapRecord"}
-
-
-class HeightMapMade(Report):
-    """A height map that was written."""
-
-    path: str
-    """File of the map."""
-
-    camera_lon_deg: float
-    """Longitude of the camera, degrees."""
-
-    camera_lat_deg: float
-    """Latitude of the camera, degrees."""
-
-    camera_height_m: float
-    """Height of the camera above the ellipsoid, metres: the zero of the heights of the map."""
-
-    ground_height_m: float | None
-    """Height of the ground under the camera above the ellipsoid, metres, if it was looked for."""
-
-    heading_deg: float
-    """Heading, degrees clockwise from true north."""
-
-    resolution_px_per_m: float
-    """Pixels per metre on the ground."""
-
-    scene_scale_m: float
-    """Scale of the scene, metres: the divisor of the heights of a normalised map."""
-
-    normalized: bool
-    """Whether the heights are divided by the scale of the scene."""
-
-    source: str
-    """File name of the source."""
-
-    source_kind: str
-    """`raster`, `city model` or `point cloud`."""
-
-    interpolation: str
-    """Interpolation between the cells of a raster."""
-
-    void_share: float
-    """Share of the pixels without a height."""
-
-    height_range_m: list[float]
-    """Lowest and highest height relative to the camera, metres."""
-
-
 class HeightMapRecord(Report):
     """A row of a list."""
 
@@ -2115,6 +2043,74 @@ class HeightMapRecord(Report):
     """Why not."""
 
     _absent = {"path": None, "camera_lon_deg": None, "camera_lat_deg": None, "camera_height_m": None, "ground_height_m": None, "heading_deg": None, "resolution_px_per_m": None, "scene_scale_m": None, "normalized": None, "source": None, "source_kind": None, "interpolation": None, "void_share": None, "height_range_m": None, "reason": None}
+
+
+class HeightMapReport(Report):
+    """Result of a height map job. It serializes as the one map, or as the list."""
+
+    path: str | None
+    """File of the map."""
+
+    camera_lon_deg: float | None
+    """Longitude of the camera, degrees."""
+
+    camera_lat_deg: float | None
+    """Latitude of the camera, degrees."""
+
+    camera_height_m: float | None
+    """Height of the camera above the ellipsoid, metres: the zero of the heights of the map."""
+
+    ground_height_m: float | None
+    """Height of the ground under the camera above the ellipsoid, metres, if it was looked for."""
+
+    heading_deg: float | None
+    """Heading, degrees clockwise from true north."""
+
+    resolution_px_per_m: float | None
+    """Pixels per metre on the ground."""
+
+    scene_scale_m: float | None
+    """Scale of the scene, metres: the divisor of the heights of a normalised map."""
+
+    normalized: bool | None
+    """Whether the heights are divided by the scale of the scene."""
+
+    source: str | None
+    """File name of the source."""
+
+    source_kind: str | None
+    """`raster`, `city model` or `point cloud`."""
+
+    interpolation: str | None
+    """Interpolation between the cells of a raster."""
+
+    void_share: float | None
+    """Share of the pixels without a height."""
+
+    height_range_m: list[float] | None
+    """Lowest and highest height relative to the camera, metres."""
+
+    rows: int | None
+    """Rows of the list."""
+
+    made: int | None
+    """Maps that were made now."""
+
+    kept: int | None
+    """Maps that an earlier run had made."""
+
+    failed: int | None
+    """Rows without a map."""
+
+    seconds: float | None
+    """Duration of the job, seconds."""
+
+    maps: list[HeightMapRecord] | None
+    """The rows, in the order of the list."""
+
+    _parts = {"maps": "HeightMapRecord"}
+
+    _absent = {"path": None, "camera_lon_deg": None, "camera_lat_deg": None, "camera_height_m": None, "ground_height_m": None, "heading_deg": None, "resolution_px_per_m": None, "scene_scale_m": None, "normalized": None, "source": None, "source_kind": None, "interpolation": None, "void_share": None, "height_range_m": None, "rows": None, "made": None, "kept": None, "failed": None, "seconds": None, "maps": None}
 
 
 class HeightMapTags(Report):
@@ -3029,77 +3025,10 @@ class PriorReport(Report):
     _parts = {"left_out": "LeftOut"}
 
 
-class PriorsDataset(Report):
-    """Priors of perspective cameras."""
-
-    generator: str
-    """Program and version."""
-
-    model: str
-    """File of the city model."""
-
-    cameras: str
-    """Source of the cameras."""
-
-    mode: str
-    """`building-only` or `building-enhanced`."""
-
-    notes: list[str]
-    """Notes: choices with their reasons, and what was left out."""
-
-    triangles: int
-    """Number of triangles of the model in use."""
-
-    sampled_area_m2: float
-    """Sampled area, m²."""
-
-    skipped_area_m2: list[list[str | float]]
-    """Area that was not sampled, by class, m²."""
-
-    samples: int
-    """Number of points on the model."""
-
-    kept: int
-    """Number of points that enough views see."""
-
-    min_views: int
-    """Lowest number of views that must see a point."""
-
-    pairs: int
-    """Number of pairs of a view and a point that it sees."""
-
-    views_histogram: list[int]
-    """Number of points by the number of views that see them. The last entry counts that many
-    views and more."""
-
-    kept_by_class: list[list[str | int]]
-    """Number of kept points, by class."""
-
-    scene_points: int
-    """Number of points taken from the structure from motion."""
-
-    error_curve: list[ErrorRow]
-    """Number of points against geometric error."""
-
-    depth_png_step: float | None
-    """Metres per step of the 16-bit depth maps. `None` if there are none."""
-
-    commands: list[str]
-    """Command lines that train on the dataset."""
-
-    views: list[ViewRow]
-    """One row per view."""
-
-    settings: Any
-    """Settings, by name."""
-
-    _parts = {"error_curve": "ErrorRow", "views": "ViewRow"}
-
-
 class PriorsJobReport(Report):
     """What was made, and what of the model could not be used."""
 
-    product: PriorsDataset | PriorsMaps
+    product: PriorsProduct
     """The report of the dataset or of the maps."""
 
     unusable_objects: int
@@ -3111,11 +3040,11 @@ class PriorsJobReport(Report):
     bytes: int
     """Size of all files, bytes."""
 
-    _parts = {"product": "PriorsDataset|PriorsMaps"}
+    _parts = {"product": "PriorsProduct"}
 
 
-class PriorsMaps(Report):
-    """Priors of satellite images."""
+class PriorsProduct(Report):
+    """Priors of one kind of cameras."""
 
     generator: str
     """Program and version."""
@@ -3123,28 +3052,79 @@ class PriorsMaps(Report):
     model: str
     """File of the city model."""
 
-    model_crs: str
-    """Reference system that the model states."""
+    cameras: str | None
+    """Source of the cameras."""
 
-    map: str
-    """Map projection in which its coordinates were read."""
+    mode: str | None
+    """`building-only` or `building-enhanced`."""
 
-    model_heights_above: str
-    """Vertical datum of its heights, in words."""
+    notes: list[str]
+    """Notes: choices with their reasons, and what was left out."""
 
     triangles: int
     """Number of triangles of the model in use."""
 
-    notes: list[str]
-    """Notes for the reader."""
+    sampled_area_m2: float | None
+    """Sampled area, m²."""
 
-    images: list[SatelliteRow]
+    skipped_area_m2: list[list[str | float]] | None
+    """Area that was not sampled, by class, m²."""
+
+    samples: int | None
+    """Number of points on the model."""
+
+    kept: int | None
+    """Number of points that enough views see."""
+
+    min_views: int | None
+    """Lowest number of views that must see a point."""
+
+    pairs: int | None
+    """Number of pairs of a view and a point that it sees."""
+
+    views_histogram: list[int] | None
+    """Number of points by the number of views that see them. The last entry counts that many
+    views and more."""
+
+    kept_by_class: list[list[str | int]] | None
+    """Number of kept points, by class."""
+
+    scene_points: int | None
+    """Number of points taken from the structure from motion."""
+
+    error_curve: list[ErrorRow] | None
+    """Number of points against geometric error."""
+
+    depth_png_step: float | None
+    """Metres per step of the 16-bit depth maps. `None` if there are none."""
+
+    commands: list[str] | None
+    """Command lines that train on the dataset."""
+
+    views: list[ViewRow] | None
+    """One row per view."""
+
+    settings: Any | None
+    """Settings, by name."""
+
+    model_crs: str | None
+    """Reference system that the model states."""
+
+    map: str | None
+    """Map projection in which its coordinates were read."""
+
+    model_heights_above: str | None
+    """Vertical datum of its heights, in words."""
+
+    images: list[SatelliteRow] | None
     """One row per image."""
 
-    maps: Any
+    maps: Any | None
     """Description of the maps, by name."""
 
-    _parts = {"images": "SatelliteRow"}
+    _parts = {"error_curve": "ErrorRow", "views": "ViewRow", "images": "SatelliteRow"}
+
+    _absent = {"cameras": None, "mode": None, "sampled_area_m2": None, "skipped_area_m2": None, "samples": None, "kept": None, "min_views": None, "pairs": None, "views_histogram": None, "kept_by_class": None, "scene_points": None, "error_curve": None, "depth_png_step": None, "commands": None, "views": None, "settings": None, "model_crs": None, "map": None, "model_heights_above": None, "images": None, "maps": None}
 
 
 class ProductsReport(Report):
@@ -3938,10 +3918,10 @@ class SplatRenderView(Report):
 class SplatsReport(Report):
     """Number of splats, and how well they stand for the surface and the images."""
 
-    seen: float | None
+    seen: float
     """Share of the cells with a height that the view sees."""
 
-    pixels: int | None
+    pixels: int
     """Number of pixels that show seen cells; the numbers below are over these."""
 
     psnr_db: float | None
@@ -3950,16 +3930,16 @@ class SplatsReport(Report):
     ssim: float | None
     """Structural similarity."""
 
-    coverage: float | None
+    coverage: float
     """Mean accumulated weight."""
 
-    gain: list[float] | None
+    gain: list[float]
     """Factor from this image's units to the reference's, per channel."""
 
-    offset: list[float] | None
+    offset: list[float]
     """Offset from this image's units to the reference's, per channel."""
 
-    image: str | None
+    image: str
     """The image."""
 
     output: str
@@ -3970,8 +3950,6 @@ class SplatsReport(Report):
 
     colour_bound: float
     """Bound on the colours that was asked for, as a share of the display range."""
-
-    _absent = {"seen": None, "pixels": None, "psnr_db": None, "ssim": None, "coverage": None, "gain": None, "offset": None, "image": None}
 
 
 class SplitImage(Report):

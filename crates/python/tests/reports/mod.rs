@@ -181,14 +181,19 @@ impl Writer {
             return self.of(&syn::parse_str(&into).expect("a type"), &[]);
         }
         if serde(&item.attrs).contains("untagged") {
-            let values = item.variants.iter().map(|v| v.fields.iter().next().expect("a value"));
-            let all: Vec<Typed> = values.map(|value| self.of(&value.ty, &[])).collect();
+            let values: Vec<&Type> =
+                item.variants.iter().map(|v| &v.fields.iter().next().expect("a value").ty).collect();
+            if values.iter().all(|ty| self.is_structure(ty)) {
+                return self.class(name, &docs(&item.attrs), |writer| writer.of_one_of(&values));
+            }
+            let all: Vec<Typed> = values.into_iter().map(|ty| self.of(ty, &[])).collect();
             return Typed::either(&all);
         }
         if option(&item.attrs, "tag").is_some() {
             return self.class(name, &docs(&item.attrs), |writer| writer.of_tagged(item));
         }
-        let plain: Vec<String> = item.variants.iter().filter(|v| v.fields.is_empty()).map(|v| called(item, v)).collect();
+        let plain: Vec<String> =
+            item.variants.iter().filter(|v| v.fields.is_empty()).map(|v| called(item, v)).collect();
         let mut all = Vec::new();
         if !plain.is_empty() {
             all.push(literal(&plain));
@@ -216,11 +221,34 @@ impl Writer {
         Typed::either(&all)
     }
 
+    /// Whether a type is a structure, in a box or not.
+    fn is_structure(&self, ty: &Type) -> bool {
+        let Type::Path(path) = ty else { return false };
+        let last = path.path.segments.last().expect("a type has a name");
+        match &last.arguments {
+            PathArguments::AngleBracketed(inner) => {
+                matches!(inner.args.first(), Some(GenericArgument::Type(inner)) if self.is_structure(inner))
+            }
+            _ => self.known.structs.contains_key(&last.ident.to_string()),
+        }
+    }
+
+    /// The attributes of one of several structures: those that not all of them have may be absent.
+    fn of_one_of(&mut self, structures: &[&Type]) -> Vec<Attributed> {
+        let all: Vec<Vec<Attributed>> = structures.iter().map(|ty| self.inlined_as_is(ty)).collect();
+        let count = |key: &str| all.iter().flatten().filter(|attribute| attribute.key == key).count();
+        let shared: BTreeSet<String> =
+            all.iter().flatten().map(|a| a.key.clone()).filter(|key| count(key) == all.len()).collect();
+        let own = |a: Attributed| if shared.contains(&a.key) { a } else { may_be_absent(a) };
+        all.into_iter().flatten().map(own).collect()
+    }
+
     /// The attributes of an enumeration whose variants say which one they are.
     fn of_tagged(&mut self, item: &ItemEnum) -> Vec<Attributed> {
         let names: Vec<String> = item.variants.iter().map(|v| called(item, v)).collect();
         let key = option(&item.attrs, "tag").expect("a tag");
-        let mut all = vec![Attributed { key, typed: literal(&names), docs: "Which of them it is.".into(), absent: None }];
+        let mut all =
+            vec![Attributed { key, typed: literal(&names), docs: "Which of them it is.".into(), absent: None }];
         for variant in &item.variants {
             all.extend(self.of_fields(&variant.fields).into_iter().map(may_be_absent));
         }
@@ -256,11 +284,18 @@ impl Writer {
 
     /// The attributes of a structure or a tagged enumeration that lies in the place of a field.
     fn inlined(&mut self, ty: &Type) -> Vec<Attributed> {
+        let is_optional =
+            matches!(ty, Type::Path(path) if path.path.segments.last().is_some_and(|s| s.ident == "Option"));
+        let all = self.inlined_as_is(ty);
+        if is_optional { all.into_iter().map(may_be_absent).collect() } else { all }
+    }
+
+    fn inlined_as_is(&mut self, ty: &Type) -> Vec<Attributed> {
         let Type::Path(path) = ty else { panic!("what is flattened has a name") };
         let last = path.path.segments.last().expect("a type has a name");
         if let PathArguments::AngleBracketed(inner) = &last.arguments {
             let Some(GenericArgument::Type(inner)) = inner.args.first() else { panic!("a type in {}", last.ident) };
-            return self.inlined(inner).into_iter().map(may_be_absent).collect();
+            return self.inlined_as_is(inner);
         }
         let name = last.ident.to_string();
         if let Some(item) = self.known.structs.get(&name).cloned() {
