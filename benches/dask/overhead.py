@@ -13,7 +13,7 @@ import distributed
 import skysweep
 import skysweep.dask as cluster
 from distributed import Client, LocalCluster
-from skysweep import _jobs
+from skysweep import _jobs, _tasks
 from skysweep.reports import ChunkRunReport, DsmReport
 
 TOWN = Path(__file__).resolve().parents[2] / "data-samples" / "town"
@@ -65,7 +65,7 @@ def main(results):
         asked = [timed(lambda: _jobs.run_chunks(folder, chunks="0", threads=1, plan=plan.id)) for _ in range(REPEATS)]
         assert all(report.done_before == 1 for report, _, _ in asked)
         found["checks_ms_per_chunk"] = 1e3 * statistics.median(cpu for _, _, cpu in asked)
-        cluster._sweep, cluster._merge = without_work, without_merge
+        _tasks._sweep, cluster.merge_task = without_work, without_merge
         resources = {"MEMORY": 1e6 * max(plan.merge_mb, plan.content.estimate.peak_mb), "CPU": 1}
         start = time.monotonic()
         with LocalCluster(

@@ -17,6 +17,7 @@ from conftest import SMALL, VIEWS, rasters
 pytest.importorskip("distributed")
 
 import skysweep.dask as cluster  # noqa: E402
+from skysweep import _tasks  # noqa: E402
 
 fcntl = pytest.importorskip("fcntl")
 
@@ -42,7 +43,7 @@ def once(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
 
 @pytest.fixture
 def short_waits(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    monkeypatch.setattr(cluster, "_WAITS_S", (0.05, 0.4))
+    monkeypatch.setattr(_tasks, "_WAITS_S", (0.05, 0.4))
     yield
 
 

@@ -27,10 +27,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, Union
 
-from . import _jobs
 from ._call import Progress, Report, Step
-from ._errors import InputError, InUseError, OutputExistsError, SkysweepError
+from ._errors import InputError, SkysweepError
 from ._plan import Plan
+from ._tasks import chunk_task, hello, merge_task, patient_chunk, patient_merge, wait_s
 from .reports import DsmReport
 
 __all__ = ["DaskReport", "DaskRunReport", "Submitted", "local_cluster", "main", "run", "submit"]
@@ -39,9 +39,6 @@ _LOG = logging.getLogger("skysweep")
 
 #: Share of the machine's memory that the workers of a local cluster may take together.
 _MEMORY_SHARE = 0.8
-#: First and longest wait for what another process holds, seconds. Its claim on a chunk ends a minute
-#: after it is gone.
-_WAITS_S = (1.0, 60.0)
 #: Time between two looks for tasks that have ended, seconds.
 _LOOK_S = 0.02
 #: The memory that chunks claim is rounded up to this share of the largest, so that the chunks of a
@@ -96,87 +93,6 @@ class Submitted:
     report: Any
 
 
-class _ChunkFailed(SkysweepError):
-    """A chunk that could not be computed."""
-
-
-def _wait_s(waits: int, chunk: int) -> float:
-    """The wait before another look, which grows, and differs between chunks."""
-    first, most = _WAITS_S
-    return min(first * 2.0 ** min(waits, 16), most) * (1.0 + (chunk % 8) / 8.0)
-
-
-def _sweep(folder: str, plan: str, chunk: int, threads: int | None) -> Report:
-    """Computes a chunk. This is all that a task does which depends on the images."""
-    report = _jobs.run_chunks(folder, chunks=str(chunk), threads=threads, plan=plan)
-    if report.failed:
-        # An earlier failure is tried again.
-        report = _jobs.run_chunks(folder, chunks=str(chunk), threads=threads, plan=plan, resume=True)
-    if report.failed:
-        raise _ChunkFailed(report.failed[0].reason)
-    return report
-
-
-def _chunk(chunk: int, folder: str, plan: str, threads: int | None) -> dict[str, Any]:
-    """Computes a chunk on a worker, unless another process holds it or the run; returns how long it
-    took."""
-    start, before = time.monotonic(), time.process_time()
-    try:
-        report = _sweep(folder, plan, chunk, threads)
-        held, computed = bool(report["elsewhere"]), int(report["computed"])
-    except InUseError:
-        held, computed = True, 0
-    seconds, cpu_seconds = time.monotonic() - start, time.process_time() - before
-    return {"held": held, "computed": computed, "seconds": seconds, "cpu_seconds": cpu_seconds}
-
-
-def _merge(folder: str, plan: str, partial: bool, overwrite: bool, threads: int | None) -> DsmReport | None:
-    """Merges the chunks on a worker; `None` where another process has the run for itself."""
-    try:
-        return _jobs.merge_run(folder, partial=partial, overwrite=overwrite, threads=threads, plan=plan)
-    except InUseError:
-        return None
-    except OutputExistsError:
-        # Another process may have merged the chunks meanwhile.
-        finished = Plan(folder).finished()
-        if finished is None:
-            raise
-        return finished
-
-
-def _patient_chunk(chunk: int, tries: int, partial: bool, **settings: Any) -> dict[str, Any]:
-    """As :func:`_chunk`, but waits and tries again on the worker."""
-    waits = 0
-    while True:
-        try:
-            result = _chunk(chunk, **settings)
-        except InputError:
-            raise
-        except SkysweepError as error:
-            tries -= 1
-            if tries < 0:
-                if partial:
-                    return {"held": False, "computed": 0, "failed": str(error)}
-                raise
-            continue
-        if not result["held"]:
-            return result
-        time.sleep(_wait_s(waits, chunk))
-        waits += 1
-
-
-def _patient_merge(chunks: Sequence[Any], **settings: Any) -> DsmReport:
-    """As :func:`_merge`, but waits on the worker. The results of the chunks are only waited for."""
-    del chunks
-    waits = 0
-    while True:
-        report = _merge(**settings)
-        if report is not None:
-            return report
-        time.sleep(_wait_s(waits, 0))
-        waits += 1
-
-
 def local_cluster(plan: Union[Plan, str, os.PathLike[str]], workers: int | None = None, **settings: Any) -> Any:
     """A `distributed.LocalCluster` whose workers can hold the chunks of a plan.
 
@@ -205,10 +121,6 @@ def local_cluster(plan: Union[Plan, str, os.PathLike[str]], workers: int | None 
         return LocalCluster(n_workers=workers, resources=resources, **{**given, **settings})
 
 
-def _hello() -> None:
-    """A task of nothing, for which a cluster that grows with its work starts a worker."""
-
-
 @dataclass
 class _Workers:
     """What the workers of a cluster have, asked once for a run."""
@@ -225,7 +137,7 @@ class _Workers:
     def of(cls, client: Any) -> _Workers:
         known = client.scheduler_info(n_workers=-1)["workers"]
         if not known:
-            client.submit(_hello, pure=False).result()
+            client.submit(hello, pure=False).result()
             known = client.scheduler_info(n_workers=-1)["workers"]
         workers = list(known.values())
         all_of = [worker.get("resources") or {} for worker in workers]
@@ -339,12 +251,12 @@ def submit(
     for claims, numbers in workers.groups(plan, threads):
         keys = [f"{_PREFIX}-chunk-{chunk:04d}-{stamp}" for chunk in numbers]
         futures = client.map(
-            _patient_chunk, numbers, key=keys, resources=claims, pure=False, tries=retries, partial=partial, **settings
+            patient_chunk, numbers, key=keys, resources=claims, pure=False, tries=retries, partial=partial, **settings
         )
         chunks.update(zip(numbers, futures))
     ordered = [chunks[chunk] for chunk in sorted(chunks)]
     report = client.submit(
-        _patient_merge,
+        patient_merge,
         ordered,
         partial=partial,
         overwrite=overwrite,
@@ -375,7 +287,7 @@ class _Course:
     def send(self, chunks: Sequence[int], claims: Mapping[str, float]) -> None:
         stamp = f"{self.plan.id[:12]}-{time.time_ns()}"
         futures = self.client.map(
-            _chunk,
+            chunk_task,
             chunks,
             key=[f"{_PREFIX}-chunk-{chunk:04d}-{stamp}" for chunk in chunks],
             resources=dict(claims),
@@ -426,7 +338,7 @@ class _Course:
             if not self.waits:
                 _LOG.warning("another process holds the run or some of its chunks; they are asked for again")
             self.waits[chunk] = waits + 1
-            heapq.heappush(self.later, (time.monotonic() + _wait_s(waits, chunk), chunk))
+            heapq.heappush(self.later, (time.monotonic() + wait_s(waits, chunk), chunk))
             return
         self.done[chunk] = result
         watching.steps(1)
@@ -439,7 +351,7 @@ class _Course:
         waits = 0
         while True:
             future = self.client.submit(
-                _merge,
+                merge_task,
                 self.plan.folder,
                 self.plan.id,
                 partial,
@@ -456,7 +368,7 @@ class _Course:
             _LOG.warning("another process has the run for itself; the merge is tried again")
             # The merge is counted beside the chunks, under a number that none of them has.
             self.waits[-1] = self.waits.get(-1, 0) + 1
-            time.sleep(_wait_s(waits, 0))
+            time.sleep(wait_s(waits, 0))
             waits += 1
 
 
