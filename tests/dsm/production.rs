@@ -420,7 +420,7 @@ fn heights_that_are_not_finite_or_were_never_searched_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     plan(folder.path(), "run", &[]);
     run("run", &["run", "-q"], folder.path(), 0);
-    let mut plan = PlanFile::read(&folder.path().join("run")).unwrap().plan;
+    let mut plan = PlanFile::read(&folder.path().join("run")).unwrap().plan.clone();
     plan.config.output = folder.path().join("merged");
     let place = |index: usize| folder.path().join(format!("run/chunks/{index:04}/result"));
     let merged = |change: &dyn Fn(&mut ChunkSurface)| {

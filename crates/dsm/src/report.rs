@@ -17,6 +17,9 @@ use crate::values::{HeightRange, MapBounds, null_is_nan};
 pub struct DsmReport {
     /// Version of the program.
     pub version: String,
+    /// Identity of the plan whose chunks were merged; absent for a run without a plan.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub plan: Option<String>,
     /// Images in the order of the configuration.
     pub images: Vec<ImageReport>,
     /// Pairs that were matched.

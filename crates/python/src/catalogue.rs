@@ -5,33 +5,39 @@
 //! second time. This file knows nothing of Python, so that tests without Python can use it.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use camera_stand::{StandConfig, StandSource};
-use jobs::align::AlignJobConfig;
-use jobs::batch::read_batch;
-use jobs::buildings::BuildingMapConfig;
+use jobs::align::{AlignJobConfig, AlignJobReport};
+use jobs::batch::{BatchReport, read_batch};
+use jobs::buildings::{BuildingMapConfig, BuildingMapReport};
 use jobs::camera_stand;
-use jobs::city::{CityConvertConfig, CityInfoConfig};
-use jobs::classes::ClassesConfig;
-use jobs::diff::DiffConfig;
-use jobs::dsm::DsmConfig;
-use jobs::dtm::DtmConfig;
-use jobs::eval::{EvalKind, GridEvalConfig, MapEvalConfig, SurfaceEvalConfig, detect_kind};
-use jobs::groundview::{ComposeConfig, GroundCameras, GroundViewConfig};
-use jobs::heightmap::{HeightMapConfig, UnprojectConfig};
+use jobs::city::{CityConvertConfig, CityConvertReport, CityInfoConfig, CitySummary};
+use jobs::classes::{ClassesConfig, ClassesReport};
+use jobs::diff::{DiffConfig, DiffReport};
+use jobs::dsm::{DsmConfig, DsmReport};
+use jobs::dtm::{DtmConfig, DtmReport};
+use jobs::eval::{
+    EvalKind, GridEvalConfig, GridEvalReport, MapEvalConfig, MapEvalReport, SurfaceEvalConfig, SurfaceEvalReport,
+    detect_kind,
+};
+use jobs::groundview::{ComposeConfig, ComposeReport, GroundCameras, GroundViewConfig, GroundViewReport};
+use jobs::heightmap::{HeightMapConfig, HeightMapReport, UnprojectConfig, UnprojectReport};
 use jobs::image_files::image_files;
-use jobs::mesh::{DepthSource, MeshJobConfig};
-use jobs::ortho::OrthoConfig;
-use jobs::priors::PriorsConfig;
-use jobs::production::{ChunkRunConfig, MergeConfig, PlanFile};
-use jobs::products::ProductsConfig;
-use jobs::register::{RegisterConfig, RegisterModel};
-use jobs::rpc::{RpcConvertConfig, RpcInfoConfig};
-use jobs::simulate::{SimulateConfig, SimulateJobError};
-use jobs::splats::{SplatConvertConfig, SplatRenderConfig, SplatsConfig};
-use jobs::split::SplitJobConfig;
-use jobs::tiles::TilesConfig;
-use jobs::train::TrainConfig;
+use jobs::mesh::{DepthSource, MeshJobConfig, MeshJobReport};
+use jobs::ortho::{OrthoConfig, OrthoReport};
+use jobs::priors::{PriorsConfig, PriorsJobReport};
+use jobs::production::{ChunkRunConfig, ChunkRunReport, MergeConfig, PlanFile};
+use jobs::products::{ProductsConfig, ProductsReport};
+use jobs::register::{RegisterConfig, RegisterModel, RegisterReport};
+use jobs::rpc::{RpcConvertConfig, RpcConvertReport, RpcInfoConfig, RpcInfoReport};
+use jobs::simulate::{SimulateConfig, SimulateJobError, SimulateReport};
+use jobs::splats::{
+    SplatConvertConfig, SplatConvertReport, SplatRenderConfig, SplatRenderReport, SplatsConfig, SplatsReport,
+};
+use jobs::split::{SplitJobConfig, SplitJobReport};
+use jobs::tiles::{TilesConfig, TilesReport};
+use jobs::train::{TrainConfig, TrainReport};
 use numeric::Progress;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -52,6 +58,8 @@ pub(crate) struct JobEntry {
     pub(crate) summary: &'static str,
     /// Type of the configuration, whose fields are the keywords.
     pub(crate) config: &'static str,
+    /// Type of the report, whose fields are the attributes of what the function returns.
+    pub(crate) report: &'static str,
     /// Field whose own fields are keywords in its place.
     pub(crate) lifted: Option<&'static str>,
     /// Keywords that must be given, in the order of the positions.
@@ -65,19 +73,21 @@ pub(crate) struct JobEntry {
 /// Makes the entry of a job that is a function from a configuration to a report.
 macro_rules! job {
     (
-        $name:literal, $summary:literal, $config:ident, $run:path, [$($required:literal),+], $base:expr
+        $name:literal, $summary:literal, $config:ident => $report:ident, $run:path, [$($required:literal),+], $base:expr
         $(, lifted $lifted:literal)?
     ) => {
         JobEntry {
             name: $name,
             summary: $summary,
             config: stringify!($config),
+            report: stringify!($report),
             lifted: [$(Some($lifted),)? None][0],
             required: &[$($required),+],
             base: || fields(&$base),
             run: |settings, progress| {
                 let config: $config = configured(fields(&$base), settings, [$(Some($lifted),)? None][0])?;
-                Ok(value(&$run(&config, progress)?))
+                let report: $report = $run(&config, progress)?;
+                Ok(value(&report))
             },
         }
     };
@@ -100,7 +110,7 @@ pub(crate) const JOBS: [JobEntry; 36] = [
     job!(
         "dsm",
         "Make a surface model from satellite images with RPCs.",
-        DsmConfig,
+        DsmConfig => DsmReport,
         surface_model,
         ["images", "output"],
         DsmConfig::new(Vec::new(), nowhere())
@@ -108,7 +118,7 @@ pub(crate) const JOBS: [JobEntry; 36] = [
     job!(
         "plan_run",
         "Plan a surface model in parts into the run folder `output`.",
-        DsmConfig,
+        DsmConfig => PlanFile,
         located_plan,
         ["images", "output"],
         DsmConfig::new(Vec::new(), nowhere())
@@ -116,7 +126,7 @@ pub(crate) const JOBS: [JobEntry; 36] = [
     job!(
         "make_plan",
         "Plan a surface model in parts and write nothing.",
-        DsmConfig,
+        DsmConfig => PlanFile,
         unwritten_plan,
         ["images", "output"],
         DsmConfig::new(Vec::new(), nowhere())
@@ -124,7 +134,7 @@ pub(crate) const JOBS: [JobEntry; 36] = [
     job!(
         "read_plan",
         "Read the plan of a run folder.",
-        PlanSettings,
+        PlanSettings => PlanFile,
         stored_plan,
         ["folder"],
         PlanSettings { folder: nowhere() }
@@ -132,31 +142,31 @@ pub(crate) const JOBS: [JobEntry; 36] = [
     job!(
         "run_chunks",
         "Compute chunks of a planned run.",
-        ChunkSettings,
+        ChunkSettings => ChunkRunReport,
         chunks,
         ["folder"],
-        ChunkSettings { folder: nowhere(), chunks: None, resume: false, threads: None }
+        ChunkSettings { folder: nowhere(), chunks: None, resume: false, threads: None, plan: None }
     ),
     job!(
         "merge_run",
         "Make the surface model of the computed chunks of a planned run.",
-        MergeSettings,
+        MergeSettings => DsmReport,
         merged,
         ["folder"],
-        MergeSettings { folder: nowhere(), partial: false, overwrite: false, threads: None }
+        MergeSettings { folder: nowhere(), partial: false, overwrite: false, threads: None, plan: None }
     ),
     job!(
         "batch",
         "Do the scenes and tasks that a batch file names.",
-        BatchSettings,
+        BatchSettings => BatchReport,
         batch,
         ["file"],
-        BatchSettings { file: nowhere() }
+        BatchSettings { file: nowhere(), only: Vec::new(), dry_run: false }
     ),
     job!(
         "dtm",
         "Find the bare ground under a surface model, and the heights above it.",
-        DtmConfig,
+        DtmConfig => DtmReport,
         jobs::dtm::run,
         ["surface", "output"],
         DtmConfig::new(nowhere(), nowhere())
@@ -164,7 +174,7 @@ pub(crate) const JOBS: [JobEntry; 36] = [
     job!(
         "classes",
         "Find ground, buildings and vegetation of a surface model.",
-        ClassesConfig,
+        ClassesConfig => ClassesReport,
         jobs::classes::run,
         ["surface", "output"],
         ClassesConfig::new(nowhere(), nowhere())
@@ -172,7 +182,7 @@ pub(crate) const JOBS: [JobEntry; 36] = [
     job!(
         "buildings",
         "Make an index of buildings from one image, in its pixels or on a surface model.",
-        BuildingMapConfig,
+        BuildingMapConfig => BuildingMapReport,
         jobs::buildings::run,
         ["image", "output"],
         BuildingMapConfig::new(nowhere(), nowhere())
@@ -180,7 +190,7 @@ pub(crate) const JOBS: [JobEntry; 36] = [
     job!(
         "diff",
         "Find what changed between two surface models, with volumes.",
-        DiffConfig,
+        DiffConfig => DiffReport,
         jobs::diff::run,
         ["before", "after", "output"],
         DiffConfig::new(nowhere(), nowhere(), nowhere())
@@ -188,7 +198,7 @@ pub(crate) const JOBS: [JobEntry; 36] = [
     job!(
         "products",
         "Make point clouds, terrain and other products of a surface model.",
-        ProductsConfig,
+        ProductsConfig => ProductsReport,
         jobs::products::run,
         ["run"],
         ProductsConfig::new(nowhere())
@@ -196,7 +206,7 @@ pub(crate) const JOBS: [JobEntry; 36] = [
     job!(
         "ortho",
         "Lay satellite images on a surface model, hidden cells marked.",
-        OrthoConfig,
+        OrthoConfig => OrthoReport,
         jobs::ortho::run,
         ["images", "surface", "output"],
         OrthoConfig::new(Vec::new(), nowhere(), nowhere())
@@ -204,7 +214,7 @@ pub(crate) const JOBS: [JobEntry; 36] = [
     job!(
         "register",
         "Correct the RPC of an image by a surface model or splats.",
-        RegisterConfig,
+        RegisterConfig => RegisterReport,
         jobs::register::run,
         ["image", "model", "output"],
         RegisterConfig::new(nowhere(), RegisterModel::Splats(nowhere()), nowhere())
@@ -212,7 +222,7 @@ pub(crate) const JOBS: [JobEntry; 36] = [
     job!(
         "evaluate_grids",
         "Measure the errors of a surface model against a reference.",
-        GridEvalConfig,
+        GridEvalConfig => GridEvalReport,
         jobs::eval::compare_grids,
         ["test", "reference"],
         GridEvalConfig::new(nowhere(), nowhere())
@@ -220,7 +230,7 @@ pub(crate) const JOBS: [JobEntry; 36] = [
     job!(
         "evaluate_surfaces",
         "Measure how far meshes, city models or clouds are from one another.",
-        SurfaceEvalConfig,
+        SurfaceEvalConfig => SurfaceEvalReport,
         jobs::eval::evaluate_surfaces,
         ["test", "reference"],
         SurfaceEvalConfig::new(nowhere(), nowhere())
@@ -228,7 +238,7 @@ pub(crate) const JOBS: [JobEntry; 36] = [
     job!(
         "evaluate_maps",
         "Compare depths, normals or masks in the pixels of one camera.",
-        MapEvalConfig,
+        MapEvalConfig => MapEvalReport,
         jobs::eval::compare_maps,
         ["test", "reference"],
         MapEvalConfig::new(nowhere(), nowhere())
@@ -236,7 +246,7 @@ pub(crate) const JOBS: [JobEntry; 36] = [
     job!(
         "kind_of_evaluation",
         "Name the evaluation for two files: grids, surfaces or maps.",
-        KindSettings,
+        KindSettings => String,
         kind,
         ["test", "reference"],
         KindSettings { test: nowhere(), reference: nowhere() }
@@ -244,7 +254,7 @@ pub(crate) const JOBS: [JobEntry; 36] = [
     job!(
         "heightmap",
         "Make height maps seen from above around a camera, turned to its heading.",
-        HeightMapConfig,
+        HeightMapConfig => HeightMapReport,
         jobs::heightmap::run,
         ["source", "output", "stand"],
         HeightMapConfig::new(nowhere(), nowhere(), stand())
@@ -252,7 +262,7 @@ pub(crate) const JOBS: [JobEntry; 36] = [
     job!(
         "unproject",
         "Turn a height map into points or splats.",
-        UnprojectConfig,
+        UnprojectConfig => UnprojectReport,
         jobs::heightmap::unproject,
         ["map", "output"],
         UnprojectConfig::new(nowhere(), nowhere())
@@ -260,7 +270,7 @@ pub(crate) const JOBS: [JobEntry; 36] = [
     job!(
         "tiles",
         "Make a folder for each position with its height map, satellite picture and cameras.",
-        TilesConfig,
+        TilesConfig => TilesReport,
         jobs::tiles::run,
         ["source", "output", "stand"],
         TilesConfig::new(HeightMapConfig::new(nowhere(), nowhere(), stand())),
@@ -269,7 +279,7 @@ pub(crate) const JOBS: [JobEntry; 36] = [
     job!(
         "groundview",
         "Make depths, normals and sky of cameras and panoramas on the ground.",
-        GroundViewConfig,
+        GroundViewConfig => GroundViewReport,
         jobs::groundview::run,
         ["surface", "output", "cameras"],
         GroundViewConfig::new(nowhere(), nowhere(), GroundCameras::Model(nowhere()))
@@ -277,7 +287,7 @@ pub(crate) const JOBS: [JobEntry; 36] = [
     job!(
         "compose",
         "Lay a rendered ground layer over a satellite layer.",
-        ComposeConfig,
+        ComposeConfig => ComposeReport,
         jobs::groundview::compose,
         ["ground", "alpha", "satellite", "output"],
         ComposeConfig::new(nowhere(), nowhere(), nowhere(), nowhere())
@@ -285,7 +295,7 @@ pub(crate) const JOBS: [JobEntry; 36] = [
     job!(
         "priors",
         "Make depth, normal and mask priors of a city model for the cameras of a scene.",
-        PriorsConfig,
+        PriorsConfig => PriorsJobReport,
         jobs::priors::run,
         ["model", "cameras", "output"],
         PriorsConfig::new(nowhere(), Vec::new(), nowhere())
@@ -293,7 +303,7 @@ pub(crate) const JOBS: [JobEntry; 36] = [
     job!(
         "splats",
         "Make Gaussian splats of a surface model and its images.",
-        SplatsConfig,
+        SplatsConfig => SplatsReport,
         jobs::splats::make,
         ["dsm", "images", "output"],
         SplatsConfig::new(nowhere(), Vec::new(), nowhere())
@@ -301,7 +311,7 @@ pub(crate) const JOBS: [JobEntry; 36] = [
     job!(
         "render_splats",
         "Look at splats through satellite images and perspective cameras.",
-        SplatRenderConfig,
+        SplatRenderConfig => SplatRenderReport,
         jobs::splats::render,
         ["splats", "output"],
         SplatRenderConfig::new(nowhere(), nowhere())
@@ -309,7 +319,7 @@ pub(crate) const JOBS: [JobEntry; 36] = [
     job!(
         "convert_splats",
         "Bring splats to another format: PLY of 3DGS or 2DGS, SPZ, SOG, binary glTF.",
-        SplatConvertConfig,
+        SplatConvertConfig => SplatConvertReport,
         jobs::splats::convert,
         ["splats", "output"],
         SplatConvertConfig::new(nowhere(), nowhere())
@@ -317,7 +327,7 @@ pub(crate) const JOBS: [JobEntry; 36] = [
     job!(
         "train",
         "Train flat Gaussian splats on the images of a dataset, with building priors.",
-        TrainConfig,
+        TrainConfig => TrainReport,
         jobs::train::run,
         ["dataset", "output"],
         TrainConfig::new(nowhere(), nowhere())
@@ -325,7 +335,7 @@ pub(crate) const JOBS: [JobEntry; 36] = [
     job!(
         "mesh",
         "Fuse the depth maps of a dataset, or its splats, to a mesh.",
-        MeshJobConfig,
+        MeshJobConfig => MeshJobReport,
         jobs::mesh::run,
         ["dataset", "depths", "output"],
         MeshJobConfig::new(nowhere(), DepthSource::Maps(nowhere()), nowhere())
@@ -333,7 +343,7 @@ pub(crate) const JOBS: [JobEntry; 36] = [
     job!(
         "align",
         "Bring a COLMAP model to the world by GPS or point pairs.",
-        AlignJobConfig,
+        AlignJobConfig => AlignJobReport,
         jobs::align::run,
         ["model", "positions", "output"],
         AlignJobConfig::new(nowhere(), nowhere(), nowhere())
@@ -341,19 +351,19 @@ pub(crate) const JOBS: [JobEntry; 36] = [
     job!(
         "split",
         "Choose context and target views of a COLMAP model by their overlap.",
-        SplitJobConfig,
+        SplitJobConfig => SplitJobReport,
         jobs::split::run,
         ["model"],
         SplitJobConfig::narrow(nowhere())
     ),
-    job!("city_info", "Describe a city model and its defects.", CityInfoConfig, jobs::city::info, ["file"],
+    job!("city_info", "Describe a city model and its defects.", CityInfoConfig => CitySummary, jobs::city::info, ["file"],
         CityInfoConfig::new(nowhere()), lifted "input"),
-    job!("city_convert", "Write a city model as triangles, footprints or objects.", CityConvertConfig,
+    job!("city_convert", "Write a city model as triangles, footprints or objects.", CityConvertConfig => CityConvertReport,
         jobs::city::convert, ["file", "output"], CityConvertConfig::new(nowhere(), nowhere()), lifted "input"),
     job!(
         "rpc_info",
         "Describe the RPC of a file.",
-        RpcInfoConfig,
+        RpcInfoConfig => RpcInfoReport,
         jobs::rpc::info,
         ["file"],
         RpcInfoConfig::new(nowhere())
@@ -361,7 +371,7 @@ pub(crate) const JOBS: [JobEntry; 36] = [
     job!(
         "rpc_convert",
         "Write the RPC of a file in another format.",
-        RpcConvertConfig,
+        RpcConvertConfig => RpcConvertReport,
         jobs::rpc::convert,
         ["file", "output"],
         RpcConvertConfig::new(nowhere(), nowhere())
@@ -371,6 +381,7 @@ pub(crate) const JOBS: [JobEntry; 36] = [
         summary: "Make a seeded scene seen through RPC cameras, with its exact surface. `scene` is a preset, \
                   a parameter file (TOML), or parameters that differ from those of the preset `town`.",
         config: "SimulateConfig",
+        report: "SimulateReport",
         lifted: None,
         required: &["scene", "output"],
         base: || fields(&SimulateConfig::new(town(), nowhere())),
@@ -381,7 +392,8 @@ pub(crate) const JOBS: [JobEntry; 36] = [
                 settings.remove("scene");
             }
             let config: SimulateConfig = configured(fields(&base), settings, None)?;
-            Ok(value(&jobs::simulate::run(&config, progress)?))
+            let report: SimulateReport = jobs::simulate::run(&config, progress)?;
+            Ok(value(&report))
         },
     },
 ];
@@ -408,6 +420,8 @@ struct ChunkSettings {
     resume: bool,
     /// Worker threads; all cores when `None`.
     threads: Option<usize>,
+    /// Identity of the plan; another one is refused.
+    plan: Option<String>,
 }
 
 /// A run to be merged.
@@ -422,6 +436,8 @@ struct MergeSettings {
     overwrite: bool,
     /// Worker threads; all cores when `None`.
     threads: Option<usize>,
+    /// Identity of the plan; another one is refused.
+    plan: Option<String>,
 }
 
 /// A batch to be done.
@@ -430,6 +446,10 @@ struct MergeSettings {
 struct BatchSettings {
     /// Batch file (TOML).
     file: PathBuf,
+    /// Scenes to work on, by name; all when empty. The others are reported as they stand.
+    only: Vec<String>,
+    /// Whether to say what would be done, and what would be refused, and do nothing.
+    dry_run: bool,
 }
 
 /// Two files to be compared.
@@ -449,7 +469,7 @@ fn with_images(config: &DsmConfig) -> Result<DsmConfig, Fault> {
     Ok(whole)
 }
 
-fn surface_model(config: &DsmConfig, progress: &dyn Progress) -> Result<impl Serialize + use<>, Fault> {
+fn surface_model(config: &DsmConfig, progress: &dyn Progress) -> Result<DsmReport, Fault> {
     Ok(jobs::dsm::run(&with_images(config)?, progress)?)
 }
 
@@ -457,39 +477,43 @@ fn located_plan(config: &DsmConfig, progress: &dyn Progress) -> Result<PlanFile,
     Ok(jobs::production::plan_run(&with_images(config)?, progress)?)
 }
 
-fn unwritten_plan(config: &DsmConfig, progress: &dyn Progress) -> Result<impl Serialize + use<>, Fault> {
+fn unwritten_plan(config: &DsmConfig, progress: &dyn Progress) -> Result<PlanFile, Fault> {
     Ok(jobs::production::make_plan(&with_images(config)?, progress)?)
 }
 
 fn stored_plan(settings: &PlanSettings, _: &dyn Progress) -> Result<PlanFile, Fault> {
-    Ok(PlanFile::read(&settings.folder)?)
+    Ok(Arc::unwrap_or_clone(PlanFile::read(&settings.folder)?))
 }
 
-fn chunks(settings: &ChunkSettings, progress: &dyn Progress) -> Result<impl Serialize + use<>, Fault> {
+fn chunks(settings: &ChunkSettings, progress: &dyn Progress) -> Result<ChunkRunReport, Fault> {
     let mut config = ChunkRunConfig::new(settings.folder.clone());
     if let Some(text) = &settings.chunks {
         config.chunks = text.parse().map_err(|e| Fault::input(&e))?;
     }
-    (config.resume, config.threads) = (settings.resume, settings.threads);
+    (config.resume, config.threads, config.plan) = (settings.resume, settings.threads, settings.plan.clone());
     Ok(jobs::production::run_chunks(&config, progress)?)
 }
 
-fn merged(settings: &MergeSettings, progress: &dyn Progress) -> Result<impl Serialize + use<>, Fault> {
+fn merged(settings: &MergeSettings, progress: &dyn Progress) -> Result<DsmReport, Fault> {
     let mut config = MergeConfig::new(settings.folder.clone());
     (config.partial, config.overwrite, config.threads) = (settings.partial, settings.overwrite, settings.threads);
+    config.plan.clone_from(&settings.plan);
     Ok(jobs::production::merge_run(&config, progress)?.report)
 }
 
-fn batch(settings: &BatchSettings, progress: &dyn Progress) -> Result<impl Serialize + use<>, Fault> {
-    Ok(jobs::batch::run(&read_batch(&settings.file)?, progress)?)
+fn batch(settings: &BatchSettings, progress: &dyn Progress) -> Result<BatchReport, Fault> {
+    let mut batch = read_batch(&settings.file)?;
+    batch.select(&settings.only)?;
+    Ok(if settings.dry_run { jobs::batch::look(&batch)? } else { jobs::batch::run(&batch, progress)? })
 }
 
-fn kind(settings: &KindSettings, _: &dyn Progress) -> Result<&'static str, Fault> {
-    Ok(match detect_kind(&settings.test, &settings.reference) {
+fn kind(settings: &KindSettings, _: &dyn Progress) -> Result<String, Fault> {
+    let kind = match detect_kind(&settings.test, &settings.reference) {
         EvalKind::Maps => "maps",
         EvalKind::Surfaces => "surfaces",
         _ => "grids",
-    })
+    };
+    Ok(kind.to_owned())
 }
 
 /// Returns a preset by its name, or the parameters of a TOML file.

@@ -26,7 +26,7 @@ pub(crate) fn raise_about(py: Python<'_>, fault: &Fault, paths: &[&Path]) -> PyE
 fn exception<'py>(py: Python<'py>, fault: &Fault, paths: &[&Path]) -> PyResult<Bound<'py, PyAny>> {
     let errors = py.import("skysweep._errors")?;
     let text = fault.text.as_str();
-    if !matches!(fault.kind, FaultKind::File | FaultKind::OutputExists) {
+    if !matches!(fault.kind, FaultKind::File | FaultKind::OutputExists | FaultKind::InUse) {
         return errors.getattr(format!("{:?}Error", fault.kind))?.call1((text,));
     }
     let named = paths.iter().filter(|path| path.to_str().is_some_and(|path| names(text, path)));
@@ -35,6 +35,7 @@ fn exception<'py>(py: Python<'py>, fault: &Fault, paths: &[&Path]) -> PyResult<B
     let code = |name: &str| py.import("errno")?.getattr(name)?.extract::<i32>();
     let (class, code) = match fault.kind {
         FaultKind::OutputExists => ("OutputExistsError", Some(code("EEXIST")?)),
+        FaultKind::InUse => ("InUseError", Some(code("EBUSY")?)),
         _ if path.as_ref().is_some_and(is_missing) => ("FileMissingError", Some(code("ENOENT")?)),
         _ => ("FileError", fault.system_code),
     };

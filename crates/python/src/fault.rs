@@ -44,6 +44,8 @@ pub(crate) enum FaultKind {
     File,
     /// An output exists and may not be replaced.
     OutputExists,
+    /// Another process has the output folder for itself, or works in it.
+    InUse,
     /// A coordinate reference system or a vertical datum cannot be used.
     Crs,
     /// The job was asked to stop.
@@ -123,6 +125,7 @@ fn of_file(error: &FileError) -> Option<FaultKind> {
     match error {
         FileError::Exists { .. } => Some(FaultKind::OutputExists),
         FileError::NotUtf8 { .. } => Some(FaultKind::Input),
+        FileError::InUse { .. } => Some(FaultKind::InUse),
         _ => Some(FaultKind::File),
     }
 }
@@ -234,9 +237,8 @@ impl Judged for DsmError {
             | Self::Memory { .. }
             | Self::Threads(_) => Some(FaultKind::Input),
             Self::Exists { .. } => Some(FaultKind::OutputExists),
-            Self::Image(_) | Self::Rpc(_) | Self::Output { .. } | Self::InUse { .. } | Self::ChunkFile { .. } => {
-                Some(FaultKind::File)
-            }
+            Self::InUse { .. } => Some(FaultKind::InUse),
+            Self::Image(_) | Self::Rpc(_) | Self::Output { .. } | Self::ChunkFile { .. } => Some(FaultKind::File),
             Self::File(error) => of_file(error),
             Self::Crs(_) => Some(FaultKind::Crs),
             Self::Cancelled => Some(FaultKind::Cancelled),
@@ -251,7 +253,7 @@ impl Judged for ProductionError {
             Self::Dsm(error) => error.kind(),
             Self::File(error) => of_file(error),
             Self::Job(error) => error.kind(),
-            Self::Threads(_) => Some(FaultKind::Input),
+            Self::Threads(_) | Self::OtherPlan { .. } => Some(FaultKind::Input),
             Self::NoPlan { .. } | Self::Plan { .. } => Some(FaultKind::File),
             _ => None,
         }

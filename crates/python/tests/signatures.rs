@@ -1,8 +1,10 @@
 //! The Python functions of the jobs, `python/skysweep/_jobs.py`, are made of the configurations:
 //! names and documentation from the Rust sources, types from the fields, defaults from serde.
 //!
-//! The test fails when the file is not what would be made now. With `SKYSWEEP_WRITE_STUBS=1`
-//! (`make stubs`) the file is written.
+//! So are the types of the reports, `reports.py`: see the module `reports`.
+//!
+//! The test fails when a file is not what would be made now. With `SKYSWEEP_WRITE_STUBS=1`
+//! (`make stubs`) the files are written.
 
 // The crate's own tests cannot be linked, because the symbols of Python are absent; these two files
 // know nothing of Python.
@@ -13,8 +15,9 @@ mod examples;
 #[allow(dead_code, reason = "the test looks at two errors only")]
 #[path = "../src/fault.rs"]
 mod fault;
+mod reports;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -278,7 +281,7 @@ impl Writer<'_> {
         }
         let mut text = format!("@job\ndef {}(\n{}    *,\n{}", entry.name, required.concat(), optional.concat());
         text += "    progress: Progress = None,\n) -> ";
-        let result = if entry.name == "kind_of_evaluation" { "str" } else { "Report" };
+        let result = if entry.report == "String" { "str" } else { entry.report };
         text += result;
         text += ":\n    \"\"\"";
         text += &wrapped(entry.summary, "    ", 3);
@@ -301,11 +304,7 @@ impl Writer<'_> {
         let (_, lines) = example.unwrap_or_else(|| panic!("{} has no example", entry.name));
         text += "\n    Example:\n        >>> import skysweep\n";
         text.extend(lines.iter().map(|line| format!("        >>> {line}\n")));
-        let _ = writeln!(
-            text,
-            "    \"\"\"\n    result: {result} = run_job(\"{}\", locals())\n    return result",
-            entry.name
-        );
+        let _ = writeln!(text, "    \"\"\"\n    return run_job(\"{}\", locals(), {result})", entry.name);
         text
     }
 }
@@ -407,8 +406,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal, TypedDict
 
-from ._call import BoundsLike, CrsCode, PathLike, Progress, Report, job, run as run_job
-
+from ._call import BoundsLike, CrsCode, PathLike, Progress, job, run as run_job
 ";
 
 fn made() -> String {
@@ -424,18 +422,26 @@ fn made() -> String {
     let settings: Vec<String> = SETTINGS.iter().map(|(name, text, jobs)| writer.settings(name, text, jobs)).collect();
     let names = JOBS.iter().map(|entry| format!("    \"{}\",\n", entry.name)).collect::<String>();
     let named: Vec<String> = writer.named.into_values().chain(settings).collect();
-    format!("{HEAD}__all__ = [\n{names}]\n\n\n{}\n\n{}", named.join("\n\n"), functions.join("\n\n"))
+    let reports = JOBS.iter().map(|entry| entry.report).filter(|name| *name != "String");
+    let imports: String = reports.collect::<BTreeSet<_>>().into_iter().map(|name| format!("    {name},\n")).collect();
+    format!(
+        "{HEAD}from .reports import (\n{imports})\n\n__all__ = [\n{names}]\n\n\n{}\n\n{}",
+        named.join("\n\n"),
+        functions.join("\n\n")
+    )
 }
 
 #[test]
-fn the_functions_are_those_of_the_configurations() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("python/skysweep/_jobs.py");
-    let made = made();
-    if std::env::var_os("SKYSWEEP_WRITE_STUBS").is_some() {
-        fs::write(&path, &made).expect("the file can be written");
+fn the_functions_are_those_of_the_configurations_and_reports() {
+    let reports: Vec<&str> = JOBS.iter().map(|entry| entry.report).collect();
+    for (name, made) in [("_jobs.py", made()), ("reports.py", reports::made(&crates(), &reports))] {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("python/skysweep").join(name);
+        if std::env::var_os("SKYSWEEP_WRITE_STUBS").is_some() {
+            fs::write(&path, &made).expect("the file can be written");
+        }
+        let found = fs::read_to_string(&path).unwrap_or_default();
+        assert!(found == made, "{} is not what the sources say: run `make stubs`", path.display());
     }
-    let found = fs::read_to_string(&path).unwrap_or_default();
-    assert!(found == made, "{} is not what the configurations say: run `make stubs`", path.display());
 }
 
 fn settings(entries: &[(&str, Value)]) -> Fields {

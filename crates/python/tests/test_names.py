@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import doctest
 import inspect
+import os
+import pydoc
+import re
 import textwrap
 from pathlib import Path
 from typing import Any, Iterator
@@ -42,6 +45,44 @@ def test_all_names_the_public_ones() -> None:
     names: dict[str, Any] = {}
     exec("from skysweep import *", names)
     assert {"dsm", "evaluate", "Raster", "DatumWarning"} <= set(names)
+
+
+def test_the_help_is_an_overview_of_all_names() -> None:
+    text = pydoc.plain(pydoc.render_doc(skysweep))
+    overview = (skysweep.__doc__ or "").split()
+    named = {name for word in overview for name in re.findall(r":\w+:`(\w+)`", word)}
+    assert named == set(skysweep.__all__) - {"__version__"}
+    # The overview comes first, before what help says of each name.
+    assert text.index("From surface models") < text.index("CLASSES") and len(overview) < 400
+
+
+def reference() -> str:
+    """The page that names everything public, with the first sentence of its docstring."""
+
+    def rows(entries: list[tuple[str, Any]]) -> str:
+        def line(name: str, value: Any) -> str:
+            text = re.sub(r":\w+:`~?([\w.]+)`", r"`\1`", (inspect.getdoc(value) or "").split("\n\n")[0])
+            return f"| `{name}` | {' '.join(text.replace('``', '`').split())} |\n"
+
+        return "| name | what it is |\n|---|---|\n" + "".join(line(*entry) for entry in entries)
+
+    public = [(name, value) for name, value in exported() if name != "__version__"]
+    functions = [(f"{name}()", value) for name, value in public if inspect.isroutine(value)]
+    classes = [(name, value) for name, value in public if inspect.isclass(value)]
+    owned = "".join(f"\n## {owner.__name__}\n{rows(sorted(methods(owner)))}" for owner in CLASSES)
+    return (
+        "# Python reference\n\n"
+        "Made of the docstrings by `SKYSWEEP_WRITE_REFERENCE=1 make test-python`. `help(skysweep.dsm)` has the keywords of a function with\n"
+        "their units and defaults, what it returns, what it raises and an example. The [guide](python.md) shows them at work.\n\n"
+        f"## Functions\n{rows(functions)}\n## Classes and exceptions\n{rows(classes)}{owned}"
+    )
+
+
+def test_the_reference_page_is_that_of_the_docstrings() -> None:
+    path = ROOT / "docs" / "guide" / "python-reference.md"
+    if "SKYSWEEP_WRITE_REFERENCE" in os.environ:
+        path.write_text(reference(), encoding="utf-8")
+    assert path.read_text(encoding="utf-8") == reference(), "run SKYSWEEP_WRITE_REFERENCE=1 make test-python"
 
 
 def test_everything_public_has_a_docstring_and_functions_have_an_example() -> None:

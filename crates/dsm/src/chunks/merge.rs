@@ -46,6 +46,8 @@ pub(crate) struct Merger<'a> {
     chunks: ChunksReport,
     /// First error of a chunk.
     error: Option<DsmError>,
+    /// Identity of the plan, where it is a file.
+    pub(crate) plan_id: Option<String>,
 }
 
 /// Place of the cells until the files are made.
@@ -77,6 +79,7 @@ impl<'a> Merger<'a> {
             findings: PriorFindings::default(),
             chunks: ChunksReport { side: plan.chunk_side.unwrap_or_default(), ..ChunksReport::default() },
             error: None,
+            plan_id: None,
         })
     }
 
@@ -145,6 +148,7 @@ impl<'a> Merger<'a> {
         let scene = &plan.report;
         let report = DsmReport {
             version: plan.version.clone(),
+            plan: self.plan_id,
             images: scene.images.clone(),
             pairs: scene.pairs.clone(),
             pointing: scene.pointing.clone(),

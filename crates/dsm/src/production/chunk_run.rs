@@ -1,6 +1,7 @@
 //! Computing chunks of a planned run.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use numeric::Progress;
@@ -35,12 +36,14 @@ pub struct ChunkRunConfig {
     pub resume: bool,
     /// Worker threads; all cores when `None`.
     pub threads: Option<usize>,
+    /// Identity of the plan that the caller knows; another one is refused.
+    pub plan: Option<String>,
 }
 
 impl ChunkRunConfig {
     /// Makes the configuration of a process that computes all chunks.
     pub fn new(folder: PathBuf) -> Self {
-        Self { folder, chunks: ChunkSelection::All, resume: false, threads: None }
+        Self { folder, chunks: ChunkSelection::All, resume: false, threads: None, plan: None }
     }
 }
 
@@ -90,7 +93,8 @@ impl ChunkRunReport {
 /// in the same folder at the same time.
 ///
 /// # Errors
-/// [`ProductionError::NoPlan`], [`ProductionError::Plan`]; [`ProductionError::OtherVersion`],
+/// [`ProductionError::NoPlan`], [`ProductionError::Plan`], [`ProductionError::OtherPlan`];
+/// [`ProductionError::OtherVersion`],
 /// [`ProductionError::ConfigChanged`], [`ProductionError::InputChanged`],
 /// [`ProductionError::InputAdded`] unless the run is resumed;
 /// [`ProductionError::File`], [`ProductionError::Threads`]; [`ProductionError::Dsm`] for a chunk
@@ -98,6 +102,7 @@ impl ChunkRunReport {
 /// fails is no error.
 pub fn run_chunks(config: &ChunkRunConfig, progress: &dyn Progress) -> Result<ChunkRunReport, ProductionError> {
     let (_share, file) = current_plan(config, progress)?;
+    file.require(config.plan.as_deref())?;
     let count = file.plan.chunks.len();
     let chosen = config.chunks.of(count);
     let chosen = chosen.map_err(|index| DsmError::NoSuchChunk { index, count })?;
@@ -121,7 +126,10 @@ pub fn run_chunks(config: &ChunkRunConfig, progress: &dyn Progress) -> Result<Ch
 
 /// Returns the plan with a share of its folder. A plan that no longer fits is made again when the
 /// run is resumed: by one of the processes that see it, while the others wait for it.
-fn current_plan(config: &ChunkRunConfig, progress: &dyn Progress) -> Result<(OutputFolder, PlanFile), ProductionError> {
+fn current_plan(
+    config: &ChunkRunConfig,
+    progress: &dyn Progress,
+) -> Result<(OutputFolder, Arc<PlanFile>), ProductionError> {
     let read = || {
         let file = PlanFile::read_current(&config.folder)?;
         threads::install(config.threads, || file.check_inputs())??;

@@ -47,6 +47,12 @@ pub enum ProductionError {
         /// Version of this program.
         here: String,
     },
+    /// The plan is another one than the caller knows.
+    #[error("the plan was replaced during the run; run again: {}", path.display())]
+    OtherPlan {
+        /// The plan.
+        path: PathBuf,
+    },
     /// The configuration has changed since the plan was made.
     #[error("the configuration was changed after the plan was made; resume the run to plan again: {}", path.display())]
     ConfigChanged {

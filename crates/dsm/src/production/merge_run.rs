@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use numeric::Progress;
+use rayon::prelude::*;
 
 use crate::production::chunk_folder::{ChunkFolder, ChunkState};
 use crate::production::error::ProductionError;
@@ -40,12 +41,14 @@ pub struct MergeConfig {
     pub overwrite: bool,
     /// Worker threads; all cores when `None`.
     pub threads: Option<usize>,
+    /// Identity of the plan that the caller knows; another one is refused.
+    pub plan: Option<String>,
 }
 
 impl MergeConfig {
     /// Makes the configuration of a merge of all chunks.
     pub fn new(folder: PathBuf) -> Self {
-        Self { folder, partial: false, overwrite: false, threads: None }
+        Self { folder, partial: false, overwrite: false, threads: None, plan: None }
     }
 }
 
@@ -53,7 +56,7 @@ impl MergeConfig {
 ///
 /// # Errors
 /// [`ProductionError::NoPlan`], [`ProductionError::Plan`], [`ProductionError::OtherVersion`],
-/// [`ProductionError::ConfigChanged`]; [`ProductionError::ChunksMissing`] and
+/// [`ProductionError::OtherPlan`], [`ProductionError::ConfigChanged`]; [`ProductionError::ChunksMissing`] and
 /// [`ProductionError::ChunkDamaged`] unless a partial result is allowed;
 /// [`ProductionError::NothingDone`]; [`ProductionError::Dsm`] for products that exist,
 /// for a folder in which chunks are computed, for what cannot be read or written, and when
@@ -63,12 +66,13 @@ pub fn merge_run(config: &MergeConfig, progress: &dyn Progress) -> Result<Produc
     PlanFile::read_current(&config.folder)?;
     let folder = OutputFolder::take(&config.folder).map_err(DsmError::from)?;
     let file = PlanFile::read_current(&config.folder)?;
+    file.require(config.plan.as_deref())?;
     if !config.overwrite {
         let products: Vec<&str> = FILES.into_iter().filter(|name| *name != USED_CONFIG).collect();
         refuse_results(&config.folder, &products)?;
     }
-    let states = states(config, &file)?;
     threads::install(config.threads, || {
+        let states = states(config, &file)?;
         let product = merge(&file, &states, DsmFolder::inside(folder)?, progress)?;
         let products = &file.plan.config.products;
         products::beside(&config.folder, products, config.overwrite, progress).map_err(DsmError::from)?;
@@ -76,29 +80,32 @@ pub fn merge_run(config: &MergeConfig, progress: &dyn Progress) -> Result<Produc
     })?
 }
 
-/// Returns how all chunks stand. The results are compared with what was written.
+/// Returns how all chunks stand. The results are compared with what was written, several at once.
 fn states(config: &MergeConfig, file: &PlanFile) -> Result<Vec<Standing>, ProductionError> {
     let count = file.plan.chunks.len();
-    let mut states = Vec::with_capacity(count);
-    for index in 0..count {
-        let folder = ChunkFolder::of(&config.folder, index);
-        // Nobody computes now: this run has the folder for itself.
-        folder.check()?;
-        folder.remove_left_over()?;
-        let state = folder.status(&file.id).map(|status| status.state);
-        states.push(match (state.as_ref().and_then(|state| folder.damage(state)), state) {
-            (Some(what), _) if config.partial => Standing::Void(format!("its result was damaged: {what}")),
-            (Some(what), _) => return Err(ProductionError::ChunkDamaged { chunk: index, what }),
-            (None, Some(ChunkState::Done { seconds, .. })) => Standing::Done { seconds },
-            (None, Some(ChunkState::Failed { reason })) => Standing::Void(reason),
-            (None, Some(ChunkState::Running(_)) | None) => Standing::Missing,
-        });
-    }
+    let all: Vec<_> = (0..count).into_par_iter().map(|index| standing(config, file, index)).collect();
+    // The error of the first chunk, whichever was seen first.
+    let states = all.into_iter().collect::<Result<Vec<_>, _>>()?;
     let missing: Vec<usize> = (0..count).filter(|index| matches!(states[*index], Standing::Missing)).collect();
     if !config.partial && !missing.is_empty() {
         return Err(ProductionError::ChunksMissing { missing, count });
     }
     Ok(states)
+}
+
+fn standing(config: &MergeConfig, file: &PlanFile, index: usize) -> Result<Standing, ProductionError> {
+    let folder = ChunkFolder::of(&config.folder, index);
+    // Nobody computes now: this run has the folder for itself.
+    folder.check()?;
+    folder.remove_left_over()?;
+    let state = folder.status(&file.id).map(|status| status.state);
+    Ok(match (state.as_ref().and_then(|state| folder.damage(state)), state) {
+        (Some(what), _) if config.partial => Standing::Void(format!("its result was damaged: {what}")),
+        (Some(what), _) => return Err(ProductionError::ChunkDamaged { chunk: index, what }),
+        (None, Some(ChunkState::Done { seconds, .. })) => Standing::Done { seconds },
+        (None, Some(ChunkState::Failed { reason })) => Standing::Void(reason),
+        (None, Some(ChunkState::Running(_)) | None) => Standing::Missing,
+    })
 }
 
 fn merge(
@@ -108,16 +115,22 @@ fn merge(
     progress: &dyn Progress,
 ) -> Result<Product, ProductionError> {
     let mut merger = Merger::begin(&file.plan, folder, progress)?;
+    merger.plan_id = Some(file.id.clone());
+    let read = |index: usize| {
+        let is_done = matches!(states.get(index), Some(Standing::Done { .. }));
+        is_done.then(|| checked(file, index))
+    };
+    let mut ahead = read(0);
     let (mut seconds, mut first) = (0.0, None);
     progress.begin("merging chunks", states.len());
     for (index, (chunk, state)) in file.plan.chunks.iter().zip(states).enumerate() {
         let reason = match state {
             Standing::Done { seconds: taken } => {
                 progress.check_cancelled().map_err(DsmError::from)?;
-                let place = ChunkFolder::of(&file.plan.config.output, index).result();
-                let result = ChunkResult::read(&place)?;
-                result.check(&file.plan, index)?;
-                merger.add(result)?;
+                let result = std::mem::take(&mut ahead).unwrap_or_else(|| checked(file, index))?;
+                let (added, next) = rayon::join(|| merger.add(result), || read(index + 1));
+                added?;
+                ahead = next;
                 seconds += taken;
                 progress.step();
                 continue;
@@ -132,4 +145,12 @@ fn merge(
         (Err(DsmError::NoSurface { .. }), Some(reason)) => Err(ProductionError::NothingDone { reason }),
         (result, _) => Ok(result?),
     }
+}
+
+/// Reads the result of a chunk and compares it with the plan.
+fn checked(file: &PlanFile, index: usize) -> Result<ChunkResult, DsmError> {
+    let place = ChunkFolder::of(&file.plan.config.output, index).result();
+    let result = ChunkResult::read(&place)?;
+    result.check(&file.plan, index)?;
+    Ok(result)
 }

@@ -21,6 +21,7 @@ mod estimate;
 mod input_files;
 mod make_or_resume;
 mod merge_run;
+mod plan_cache;
 mod plan_file;
 mod plan_run;
 mod plan_text;

@@ -4,6 +4,7 @@
 //! decides the bytes of the result: version, configuration, contents of the inputs, chunks.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
@@ -12,6 +13,7 @@ use crate::production::content_hash;
 use crate::production::error::ProductionError;
 use crate::production::estimate::PlanEstimate;
 use crate::production::input_files::{self, InputFile};
+use crate::production::plan_cache::{keep, kept, stamp};
 use crate::{DsmConfig, Plan, USED_CONFIG, files_of, open};
 use job::files::TEXT_LIMIT;
 use job::job_paths::{relative, resolved};
@@ -67,12 +69,22 @@ impl PlanFile {
         }
     }
 
-    /// Reads the plan in the folder of a run.
+    /// Reads the plan in the folder of a run, unless this process has read it last.
     ///
     /// # Errors
     /// [`ProductionError::NoPlan`], [`ProductionError::Plan`] for a file that is damaged or was
     /// edited or whose parts do not fit each other, [`ProductionError::OtherVersion`].
-    pub fn read(folder: &Path) -> Result<Self, ProductionError> {
+    pub fn read(folder: &Path) -> Result<Arc<Self>, ProductionError> {
+        let stamp = stamp(&folder.join(PLAN));
+        if let Some(known) = kept(folder, stamp) {
+            return Ok(known);
+        }
+        let file = Arc::new(Self::parsed(folder)?);
+        keep(folder, stamp, &file);
+        Ok(file)
+    }
+
+    fn parsed(folder: &Path) -> Result<Self, ProductionError> {
         let path = folder.join(PLAN);
         let failed = |reason: String| ProductionError::Plan { path: path.clone(), reason };
         if !path.exists() {
@@ -100,13 +112,26 @@ impl PlanFile {
     ///
     /// # Errors
     /// As [`Self::read`]; [`ProductionError::Job`], [`ProductionError::ConfigChanged`].
-    pub(super) fn read_current(folder: &Path) -> Result<Self, ProductionError> {
+    pub(super) fn read_current(folder: &Path) -> Result<Arc<Self>, ProductionError> {
         let file = Self::read(folder)?;
         let path = folder.join(USED_CONFIG);
         if !same(&read_dsm_job(&path)?, &file.plan.config, folder) {
             return Err(ProductionError::ConfigChanged { path });
         }
         Ok(file)
+    }
+
+    /// Checks that the plan is the one that a caller knows.
+    ///
+    /// # Errors
+    /// [`ProductionError::OtherPlan`].
+    pub(super) fn require(&self, known: Option<&str>) -> Result<(), ProductionError> {
+        match known {
+            Some(known) if known != self.id => {
+                Err(ProductionError::OtherPlan { path: self.plan.config.output.join(PLAN) })
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Whether the plan is of a configuration.

@@ -1,6 +1,7 @@
 //! Planning a run: the scene is looked at once, and what was found is written for the chunks.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use numeric::Progress;
 use serde::Serialize;
@@ -110,7 +111,7 @@ pub(super) fn plan_again(
     progress: &dyn Progress,
 ) -> Result<(), ProductionError> {
     let taken = OutputFolder::take(folder)?;
-    let fits = |file: PlanFile| threads::install(threads, || file.check_inputs())?;
+    let fits = |file: Arc<PlanFile>| threads::install(threads, || file.check_inputs())?;
     match PlanFile::read_current(folder).and_then(fits) {
         Ok(()) => return Ok(()),
         Err(error) => progress.warn(&format!("the run is planned and computed again: {error}")),

@@ -1,16 +1,41 @@
 """Satellite surface models from RPC images, and building priors.
 
-Jobs are functions whose keywords are the settings of the command ``skysweep``::
+Jobs are functions whose keywords are the settings of the command ``skysweep``. They write files and
+return a report with attributes; ``help(skysweep.dsm)`` lists keywords, units and defaults::
 
     import skysweep
     report = skysweep.dsm(["left.tif", "right.tif"], "out", gsd_m=0.5, progress=True)
     print(report.surface.observed)
 
-Objects are :class:`Rpc` (cameras on arrays), :class:`HeightSweep` (heights of arrays),
-:class:`CityModel` (ray casting), :class:`Plan` (surface models in parts) and :class:`Raster` (cells
-with their map and vertical datum). :func:`evaluate` measures surfaces in files and in memory.
-``skysweep.dask`` runs plans on a cluster. Warnings of jobs go to the logger ``skysweep``; a vertical
-datum that is assumed is a :class:`DatumWarning`.
+Surface models
+    :func:`dsm` makes one, :func:`batch` many, :func:`products` what is made of one (clouds, meshes,
+    contours). In parts: :class:`Plan`, with :func:`make_plan`, :func:`plan_run`, :func:`read_plan`,
+    :func:`run_chunks` and :func:`merge_run` beneath it. ``skysweep.dask`` runs plans on a cluster.
+From surface models
+    :func:`dtm` finds the ground, :func:`classes` buildings and vegetation, :func:`diff` changes,
+    :func:`buildings` an index of one image. :func:`ortho` lays images on a surface,
+    :func:`register` corrects the RPC of a new image. :func:`heightmap`, :func:`unproject` and
+    :func:`tiles` see a place from above, :func:`groundview` and :func:`compose` from the ground.
+Accuracy
+    :func:`evaluate` measures surfaces in files and in memory; :func:`kind_of_evaluation` chooses
+    among :func:`evaluate_grids`, :func:`evaluate_surfaces` and :func:`evaluate_maps`.
+    :func:`simulate` makes scenes whose exact surface is known.
+City models, splats, cameras
+    :func:`priors` of a city model, :func:`city_info`, :func:`city_convert`; :func:`splats`,
+    :func:`render_splats`, :func:`convert_splats`, :func:`train`, :func:`mesh`; :func:`align` and
+    :func:`split` of COLMAP models; :func:`rpc_info`, :func:`rpc_convert`.
+Objects on arrays
+    :class:`Rpc` projects points and finds them (:class:`FittedRpc` is a fit), :class:`HeightSweep`
+    finds the heights of arrays (:class:`ViewHeights`), :class:`CityModel` casts rays
+    (:class:`Hits`), and :class:`Raster` has cells with their map and vertical datum (:class:`Bounds`,
+    :func:`read_raster`, :func:`write_raster`).
+Progress, reports, errors
+    `progress` takes ``True`` or a function of a :class:`Step` (:data:`Progress`). A :class:`Report`
+    is a dictionary whose keys are attributes; :mod:`skysweep.reports` has the class of each. Errors
+    are a :class:`SkysweepError`: :class:`InputError`, :class:`FileError`,
+    :class:`FileMissingError`, :class:`OutputExistsError`, :class:`InUseError`, :class:`CrsError`,
+    :class:`CancelledError`. Warnings of jobs go to the logger ``skysweep``; a vertical datum that is
+    assumed is a :class:`DatumWarning`. :func:`allow_remote` lets jobs read addresses.
 """
 
 from . import _jobs
@@ -25,6 +50,7 @@ from ._errors import DatumWarning as DatumWarning
 from ._errors import FileError as FileError
 from ._errors import FileMissingError as FileMissingError
 from ._errors import InputError as InputError
+from ._errors import InUseError as InUseError
 from ._errors import OutputExistsError as OutputExistsError
 from ._errors import SkysweepError as SkysweepError
 from ._evaluate import evaluate as evaluate
@@ -52,6 +78,7 @@ __all__ = [
     "FittedRpc",
     "HeightSweep",
     "Hits",
+    "InUseError",
     "InputError",
     "OutputExistsError",
     "Plan",

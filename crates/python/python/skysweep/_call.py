@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import copy
 import difflib
 import functools
 import inspect
@@ -10,19 +11,22 @@ import json
 import logging
 import math
 import os
+import sys
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Callable, Protocol, TypeVar, Union, cast
+from typing import TYPE_CHECKING, Any, Callable, ClassVar, Protocol, TypeVar, Union, cast
 
 from . import _native
 from ._crs import epsg_of, parts_of
 from ._errors import InputError
 
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
 __all__ = ["BoundsLike", "CrsCode", "PathLike", "Progress", "Report", "Step", "job", "run"]
 
 _LOG = logging.getLogger("skysweep")
-
 
 
 class Dataset(Protocol):
@@ -54,24 +58,53 @@ BoundsLike = Union[Sequence[float], Polygons]
 CrsCode = Union[int, str, _WithCode]
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
+_Result = TypeVar("_Result")
 
 
 class Report(dict):  # type: ignore[type-arg]
     """The report of a job: a dictionary whose keys are attributes as well.
 
     The keys are those of the command line's ``--json``. ``None`` stands for numbers that are not
-    known.
+    known. The class of each report is in :mod:`skysweep.reports`, with its attributes and their
+    types.
     """
 
-    def __getattr__(self, name: str) -> Any:
-        try:
-            return self[name]
-        except KeyError:
+    #: Classes of the dictionaries under a key, by name: `*` stands before the class of the values of
+    #: a dictionary, `|` between classes of which one fits.
+    _parts: ClassVar[Mapping[str, str]] = {}
+    #: What an attribute is where the report has no such key.
+    _absent: ClassVar[Mapping[str, Any]] = {}
+
+    if not TYPE_CHECKING:
+        # For mypy the attributes are those that the class declares, and no others.
+        def __getattr__(self, name: str) -> Any:
+            if name in self:
+                return self[name]
+            if name in self._absent:
+                return copy.copy(self._absent[name])
             known = ", ".join(map(str, self)) or "none"
-            raise AttributeError(f"the report has no {name!r}; it has {known}") from None
+            raise AttributeError(f"the report has no {name!r}; it has {known}")
 
     def __dir__(self) -> list[str]:
         return [*super().__dir__(), *map(str, self)]
+
+    @classmethod
+    def _of(cls, content: Mapping[str, Any]) -> Self:
+        """Makes the report of what JSON holds, with a class for each part."""
+        return cls({key: _typed(cls, cls._parts.get(key, ""), value) for key, value in content.items()})
+
+
+def _typed(owner: type[Report], name: str, value: Any) -> Any:
+    if isinstance(value, list):
+        return [_typed(owner, name, item) for item in value]
+    if not isinstance(value, dict):
+        return value
+    if name.startswith("*"):
+        return {key: _typed(owner, name[1:], item) for key, item in value.items()}
+    known = [getattr(sys.modules[owner.__module__], one) for one in name.split("|") if one]
+    # Of several classes the one that has attributes for most of the keys.
+    fitting = max(known, key=lambda one: len(one.__annotations__.keys() & value.keys()), default=Report)
+    return fitting._of(value)
 
 
 @dataclass(frozen=True)
@@ -306,8 +339,9 @@ def _bounds(given: dict[str, Any], known: Mapping[str, Any]) -> None:
     given["bounds"] = [float(edge) for edge in frame.total_bounds]
 
 
-def run(name: str, settings: Mapping[str, Any]) -> Any:
-    """Runs the job called `name`. Settings that are `None` have their defaults."""
+def run(name: str, settings: Mapping[str, Any], result: type[_Result]) -> _Result:
+    """Runs the job called `name`, which returns a `result`. Settings that are `None` have their
+    defaults."""
     given = {key: value for key, value in settings.items() if value is not None}
     progress = given.pop("progress", None)
     with contextlib.ExitStack() as stack:
@@ -319,7 +353,8 @@ def run(name: str, settings: Mapping[str, Any]) -> Any:
         plain = {key: _plain(key, value, files) for key, value in given.items()}
         watching = stack.enter_context(watcher(progress))
         text = _native.run_job(name, json.dumps(plain, allow_nan=False), watching)
-    return json.loads(text, object_hook=Report)
+    found = json.loads(text)
+    return cast(_Result, result._of(found) if issubclass(result, Report) else found)
 
 
 def job(function: _Function) -> _Function:

@@ -8,6 +8,7 @@ __all__ = [
     "FileError",
     "FileMissingError",
     "OutputExistsError",
+    "InUseError",
     "CrsError",
     "CancelledError",
     "DatumWarning",
@@ -44,6 +45,10 @@ class OutputExistsError(FileError, FileExistsError):
     """An output exists and `overwrite` is not set. Nothing was changed."""
 
 
+class InUseError(FileError):
+    """Another process has the output folder for itself, or works in it. Try again later."""
+
+
 class CrsError(SkysweepError, ValueError):
     """A coordinate reference system or a vertical datum cannot be used."""
 
@@ -63,6 +68,7 @@ for _class in (
     FileError,
     FileMissingError,
     OutputExistsError,
+    InUseError,
     CrsError,
     CancelledError,
     DatumWarning,

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import os
 import tempfile
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from . import _jobs, _native
-from ._call import Report, path_of
+from ._call import path_of
 from ._errors import InputError, SkysweepError
 from ._raster import Raster, Surface, assumed, heights_of, is_in_memory, raster_of
+from .reports import GridEvalReport
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -26,7 +27,7 @@ _ANY_MAP = "EPSG:32631"
 
 def evaluate(
     test: Surface, reference: Surface, *, cell_m: float | None = None, **settings: Unpack[EvaluateSettings]
-) -> Report:
+) -> GridEvalReport:
     """Measures the errors of a surface against a reference.
 
     Both may be files, of which the kind decides the evaluation (:func:`evaluate_grids`,
@@ -45,8 +46,9 @@ def evaluate(
         **settings: Settings of the evaluation.
 
     Returns:
-        The report of the evaluation; of grids with ``metrics``: ``mae``,
-        ``rmse``, ``nmad``, …, metres.
+        The report of the evaluation; of grids with ``metrics``: ``mae``, ``rmse``, ``nmad``, …,
+        metres. Its type is that of grids; :func:`evaluate_surfaces` and :func:`evaluate_maps` have
+        the types of the others.
 
     Raises:
         InputError: A grid is empty or has no place, the grids share no cell, or a value such as −9999
@@ -81,12 +83,12 @@ def evaluate(
         return _evaluated(files["test"], files["reference"], given)
 
 
-def _evaluated(test: str, reference: str, settings: dict[str, Any]) -> Report:
+def _evaluated(test: str, reference: str, settings: dict[str, Any]) -> GridEvalReport:
     kind = _jobs.kind_of_evaluation(test, reference)
     if kind == "maps":
-        return _jobs.evaluate_maps(test, reference, **settings)
+        return cast(GridEvalReport, _jobs.evaluate_maps(test, reference, **settings))
     if kind == "surfaces":
-        return _jobs.evaluate_surfaces(test, reference, **settings)
+        return cast(GridEvalReport, _jobs.evaluate_surfaces(test, reference, **settings))
     return _jobs.evaluate_grids(test, reference, **settings)
 
 

@@ -9,7 +9,41 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal, TypedDict
 
-from ._call import BoundsLike, CrsCode, PathLike, Progress, Report, job, run as run_job
+from ._call import BoundsLike, CrsCode, PathLike, Progress, job, run as run_job
+from .reports import (
+    AlignJobReport,
+    BatchReport,
+    BuildingMapReport,
+    ChunkRunReport,
+    CityConvertReport,
+    CitySummary,
+    ClassesReport,
+    ComposeReport,
+    DiffReport,
+    DsmReport,
+    DtmReport,
+    GridEvalReport,
+    GroundViewReport,
+    HeightMapReport,
+    MapEvalReport,
+    MeshJobReport,
+    OrthoReport,
+    PlanFile,
+    PriorsJobReport,
+    ProductsReport,
+    RegisterReport,
+    RpcConvertReport,
+    RpcInfoReport,
+    SimulateReport,
+    SplatConvertReport,
+    SplatRenderReport,
+    SplatsReport,
+    SplitJobReport,
+    SurfaceEvalReport,
+    TilesReport,
+    TrainReport,
+    UnprojectReport,
+)
 
 __all__ = [
     "dsm",
@@ -528,7 +562,7 @@ def dsm(
     tile: int = 1024,
     overwrite: bool = False,
     progress: Progress = None,
-) -> Report:
+) -> DsmReport:
     """Make a surface model from satellite images with RPCs.
 
     Args:
@@ -590,8 +624,7 @@ def dsm(
         >>> report = skysweep.dsm(["left.tif", "right.tif"], "run", gsd_m=0.5, preset="fast")
         >>> print(report.surface.observed)
     """
-    result: Report = run_job("dsm", locals())
-    return result
+    return run_job("dsm", locals(), DsmReport)
 
 
 @job
@@ -629,7 +662,7 @@ def plan_run(
     tile: int = 1024,
     overwrite: bool = False,
     progress: Progress = None,
-) -> Report:
+) -> PlanFile:
     """Plan a surface model in parts into the run folder `output`.
 
     Args:
@@ -690,8 +723,7 @@ def plan_run(
         >>> import skysweep
         >>> plan = skysweep.plan_run(["left.tif", "right.tif"], "run", gsd_m=0.5, chunk=2048)
     """
-    result: Report = run_job("plan_run", locals())
-    return result
+    return run_job("plan_run", locals(), PlanFile)
 
 
 @job
@@ -729,7 +761,7 @@ def make_plan(
     tile: int = 1024,
     overwrite: bool = False,
     progress: Progress = None,
-) -> Report:
+) -> PlanFile:
     """Plan a surface model in parts and write nothing.
 
     Args:
@@ -791,8 +823,7 @@ def make_plan(
         >>> plan = skysweep.make_plan(["left.tif", "right.tif"], "run", memory_mb=2000)
         >>> print(len(plan.plan.chunks))
     """
-    result: Report = run_job("make_plan", locals())
-    return result
+    return run_job("make_plan", locals(), PlanFile)
 
 
 @job
@@ -800,7 +831,7 @@ def read_plan(
     folder: PathLike,
     *,
     progress: Progress = None,
-) -> Report:
+) -> PlanFile:
     """Read the plan of a run folder.
 
     Args:
@@ -818,8 +849,7 @@ def read_plan(
         >>> import skysweep
         >>> plan = skysweep.read_plan("run")
     """
-    result: Report = run_job("read_plan", locals())
-    return result
+    return run_job("read_plan", locals(), PlanFile)
 
 
 @job
@@ -829,8 +859,9 @@ def run_chunks(
     chunks: str | None = None,
     resume: bool = False,
     threads: int | None = None,
+    plan: str | None = None,
     progress: Progress = None,
-) -> Report:
+) -> ChunkRunReport:
     """Compute chunks of a planned run.
 
     Args:
@@ -840,6 +871,7 @@ def run_chunks(
         resume: Whether failed chunks are tried again, and what no longer fits is planned and
             computed again.
         threads: Worker threads; all cores when `None`.
+        plan: Identity of the plan; another one is refused.
         progress: `True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.
 
     Returns:
@@ -854,8 +886,7 @@ def run_chunks(
         >>> report = skysweep.run_chunks("run", chunks="2/5", threads=4)
         >>> print(report.computed)
     """
-    result: Report = run_job("run_chunks", locals())
-    return result
+    return run_job("run_chunks", locals(), ChunkRunReport)
 
 
 @job
@@ -865,8 +896,9 @@ def merge_run(
     partial: bool = False,
     overwrite: bool = False,
     threads: int | None = None,
+    plan: str | None = None,
     progress: Progress = None,
-) -> Report:
+) -> DsmReport:
     """Make the surface model of the computed chunks of a planned run.
 
     Args:
@@ -874,6 +906,7 @@ def merge_run(
         partial: Whether chunks without a result are left void. Otherwise they are an error.
         overwrite: Whether existing products may be replaced.
         threads: Worker threads; all cores when `None`.
+        plan: Identity of the plan; another one is refused.
         progress: `True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.
 
     Returns:
@@ -887,20 +920,23 @@ def merge_run(
         >>> import skysweep
         >>> report = skysweep.merge_run("run", partial=True)
     """
-    result: Report = run_job("merge_run", locals())
-    return result
+    return run_job("merge_run", locals(), DsmReport)
 
 
 @job
 def batch(
     file: PathLike,
     *,
+    only: Sequence[str] = (),
+    dry_run: bool = False,
     progress: Progress = None,
-) -> Report:
+) -> BatchReport:
     """Do the scenes and tasks that a batch file names.
 
     Args:
         file: Batch file (TOML).
+        only: Scenes to work on, by name; all when empty. The others are reported as they stand.
+        dry_run: Whether to say what would be done, and what would be refused, and do nothing.
         progress: `True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.
 
     Returns:
@@ -914,8 +950,7 @@ def batch(
         >>> import skysweep
         >>> report = skysweep.batch("night.toml", progress=True)
     """
-    result: Report = run_job("batch", locals())
-    return result
+    return run_job("batch", locals(), BatchReport)
 
 
 @job
@@ -928,7 +963,7 @@ def dtm(
     threads: int | None = None,
     overwrite: bool = False,
     progress: Progress = None,
-) -> Report:
+) -> DtmReport:
     """Find the bare ground under a surface model, and the heights above it.
 
     Args:
@@ -952,8 +987,7 @@ def dtm(
         >>> import skysweep
         >>> report = skysweep.dtm("run", "terrain", surface_vertical="egm96")
     """
-    result: Report = run_job("dtm", locals())
-    return result
+    return run_job("dtm", locals(), DtmReport)
 
 
 @job
@@ -972,7 +1006,7 @@ def classes(
     threads: int | None = None,
     overwrite: bool = False,
     progress: Progress = None,
-) -> Report:
+) -> ClassesReport:
     """Find ground, buildings and vegetation of a surface model.
 
     Args:
@@ -1004,8 +1038,7 @@ def classes(
         >>> import skysweep
         >>> report = skysweep.classes("run", "classes", multispectral=["multispectral.tif"])
     """
-    result: Report = run_job("classes", locals())
-    return result
+    return run_job("classes", locals(), ClassesReport)
 
 
 @job
@@ -1021,7 +1054,7 @@ def buildings(
     threads: int | None = None,
     overwrite: bool = False,
     progress: Progress = None,
-) -> Report:
+) -> BuildingMapReport:
     """Make an index of buildings from one image, in its pixels or on a surface model.
 
     Args:
@@ -1050,8 +1083,7 @@ def buildings(
         >>> import skysweep
         >>> report = skysweep.buildings("left.tif", "index.tif", surface="run")
     """
-    result: Report = run_job("buildings", locals())
-    return result
+    return run_job("buildings", locals(), BuildingMapReport)
 
 
 @job
@@ -1074,7 +1106,7 @@ def diff(
     threads: int | None = None,
     overwrite: bool = False,
     progress: Progress = None,
-) -> Report:
+) -> DiffReport:
     """Find what changed between two surface models, with volumes.
 
     Args:
@@ -1114,8 +1146,7 @@ def diff(
         >>> report = skysweep.diff("run_2023", "run_2024", "change", areas="blocks.geojson", areas_field="name")
         >>> print(report.areas)
     """
-    result: Report = run_job("diff", locals())
-    return result
+    return run_job("diff", locals(), DiffReport)
 
 
 @job
@@ -1131,7 +1162,7 @@ def products(
     threads: int | None = None,
     overwrite: bool = False,
     progress: Progress = None,
-) -> Report:
+) -> ProductsReport:
     """Make point clouds, terrain and other products of a surface model.
 
     Args:
@@ -1162,8 +1193,7 @@ def products(
         >>> import skysweep
         >>> report = skysweep.products("run", products=["cloud", "dtm"])
     """
-    result: Report = run_job("products", locals())
-    return result
+    return run_job("products", locals(), ProductsReport)
 
 
 @job
@@ -1183,7 +1213,7 @@ def ortho(
     threads: int | None = None,
     overwrite: bool = False,
     progress: Progress = None,
-) -> Report:
+) -> OrthoReport:
     """Lay satellite images on a surface model, hidden cells marked.
 
     Args:
@@ -1217,8 +1247,7 @@ def ortho(
         >>> import skysweep
         >>> report = skysweep.ortho(["left.tif"], "run", "orthos", cell_m=0.5)
     """
-    result: Report = run_job("ortho", locals())
-    return result
+    return run_job("ortho", locals(), OrthoReport)
 
 
 @job
@@ -1234,7 +1263,7 @@ def register(
     threads: int | None = None,
     overwrite: bool = False,
     progress: Progress = None,
-) -> Report:
+) -> RegisterReport:
     """Correct the RPC of an image by a surface model or splats.
 
     Args:
@@ -1261,8 +1290,7 @@ def register(
         >>> model = {"surface": {"dsm": "run", "images": ["left.tif"]}}
         >>> report = skysweep.register("new.tif", model, "new.json")
     """
-    result: Report = run_job("register", locals())
-    return result
+    return run_job("register", locals(), RegisterReport)
 
 
 @job
@@ -1290,7 +1318,7 @@ def evaluate_grids(
     requirements: EvalRequirements | None = None,
     threads: int | None = None,
     progress: Progress = None,
-) -> Report:
+) -> GridEvalReport:
     """Measure the errors of a surface model against a reference.
 
     Args:
@@ -1335,8 +1363,7 @@ def evaluate_grids(
         >>> report = skysweep.evaluate_grids("run", "lidar.laz", alignment="xyz", error_map="errors.tif")
         >>> print(report.metrics.mae)
     """
-    result: Report = run_job("evaluate_grids", locals())
-    return result
+    return run_job("evaluate_grids", locals(), GridEvalReport)
 
 
 @job
@@ -1361,7 +1388,7 @@ def evaluate_surfaces(
     requirements: EvalRequirements | None = None,
     threads: int | None = None,
     progress: Progress = None,
-) -> Report:
+) -> SurfaceEvalReport:
     """Measure how far meshes, city models or clouds are from one another.
 
     Args:
@@ -1398,8 +1425,7 @@ def evaluate_surfaces(
         >>> import skysweep
         >>> report = skysweep.evaluate_surfaces("town.ply", "town.city.json", lod="2.2")
     """
-    result: Report = run_job("evaluate_surfaces", locals())
-    return result
+    return run_job("evaluate_surfaces", locals(), SurfaceEvalReport)
 
 
 @job
@@ -1411,7 +1437,7 @@ def evaluate_maps(
     max_mae: float | None = None,
     threads: int | None = None,
     progress: Progress = None,
-) -> Report:
+) -> MapEvalReport:
     """Compare depths, normals or masks in the pixels of one camera.
 
     Args:
@@ -1433,8 +1459,7 @@ def evaluate_maps(
         >>> import skysweep
         >>> report = skysweep.evaluate_maps("depth.npy", "truth.npy", kind="depth")
     """
-    result: Report = run_job("evaluate_maps", locals())
-    return result
+    return run_job("evaluate_maps", locals(), MapEvalReport)
 
 
 @job
@@ -1462,8 +1487,7 @@ def kind_of_evaluation(
         >>> import skysweep
         >>> kind = skysweep.kind_of_evaluation("run", "lidar.laz")
     """
-    result: str = run_job("kind_of_evaluation", locals())
-    return result
+    return run_job("kind_of_evaluation", locals(), str)
 
 
 @job
@@ -1487,7 +1511,7 @@ def heightmap(
     threads: int | None = None,
     overwrite: bool = False,
     progress: Progress = None,
-) -> Report:
+) -> HeightMapReport:
     """Make height maps seen from above around a camera, turned to its heading.
 
     Args:
@@ -1525,8 +1549,7 @@ def heightmap(
         >>> place = {"lon_deg": 5.4, "lat_deg": 43.53}
         >>> report = skysweep.heightmap("run", "map.tif", {"source": {"position": place}}, size_px=256)
     """
-    result: Report = run_job("heightmap", locals())
-    return result
+    return run_job("heightmap", locals(), HeightMapReport)
 
 
 @job
@@ -1540,7 +1563,7 @@ def unproject(
     merge_m: float | None = None,
     overwrite: bool = False,
     progress: Progress = None,
-) -> Report:
+) -> UnprojectReport:
     """Turn a height map into points or splats.
 
     Args:
@@ -1568,8 +1591,7 @@ def unproject(
         >>> import skysweep
         >>> report = skysweep.unproject("map.tif", "points.ply", axes="world")
     """
-    result: Report = run_job("unproject", locals())
-    return result
+    return run_job("unproject", locals(), UnprojectReport)
 
 
 @job
@@ -1596,7 +1618,7 @@ def tiles(
     corrections: Literal["surface_run", "uncorrected"] | Mapping[str, Any] = "surface_run",
     mosaic: Literal["best", "feather", "median"] = "best",
     progress: Progress = None,
-) -> Report:
+) -> TilesReport:
     """Make a folder for each position with its height map, satellite picture and cameras.
 
     Args:
@@ -1637,8 +1659,7 @@ def tiles(
         >>> place = {"lon_deg": 5.4, "lat_deg": 43.53}
         >>> report = skysweep.tiles("run", "tiles", {"source": {"position": place}}, images=["left.tif"], size_px=256)
     """
-    result: Report = run_job("tiles", locals())
-    return result
+    return run_job("tiles", locals(), TilesReport)
 
 
 @job
@@ -1657,7 +1678,7 @@ def groundview(
     threads: int | None = None,
     overwrite: bool = False,
     progress: Progress = None,
-) -> Report:
+) -> GroundViewReport:
     """Make depths, normals and sky of cameras and panoramas on the ground.
 
     Args:
@@ -1688,8 +1709,7 @@ def groundview(
         >>> import skysweep
         >>> report = skysweep.groundview("run", "views", {"model": "sparse/0"})
     """
-    result: Report = run_job("groundview", locals())
-    return result
+    return run_job("groundview", locals(), GroundViewReport)
 
 
 @job
@@ -1701,7 +1721,7 @@ def compose(
     *,
     overwrite: bool = False,
     progress: Progress = None,
-) -> Report:
+) -> ComposeReport:
     """Lay a rendered ground layer over a satellite layer.
 
     Args:
@@ -1724,8 +1744,7 @@ def compose(
         >>> import skysweep
         >>> report = skysweep.compose("ground.png", "alpha.png", "satellite.png", "both.png")
     """
-    result: Report = run_job("compose", locals())
-    return result
+    return run_job("compose", locals(), ComposeReport)
 
 
 @job
@@ -1760,7 +1779,7 @@ def priors(
     threads: int | None = None,
     overwrite: bool = False,
     progress: Progress = None,
-) -> Report:
+) -> PriorsJobReport:
     """Make depth, normal and mask priors of a city model for the cameras of a scene.
 
     Args:
@@ -1813,8 +1832,7 @@ def priors(
         >>> import skysweep
         >>> report = skysweep.priors("town.city.json", ["cameras"], "priors", mode="building-only")
     """
-    result: Report = run_job("priors", locals())
-    return result
+    return run_job("priors", locals(), PriorsJobReport)
 
 
 @job
@@ -1838,7 +1856,7 @@ def splats(
     threads: int | None = None,
     overwrite: bool = False,
     progress: Progress = None,
-) -> Report:
+) -> SplatsReport:
     """Make Gaussian splats of a surface model and its images.
 
     Args:
@@ -1875,8 +1893,7 @@ def splats(
         >>> import skysweep
         >>> report = skysweep.splats("run", ["left.tif", "right.tif"], "splats.ply", walls=False)
     """
-    result: Report = run_job("splats", locals())
-    return result
+    return run_job("splats", locals(), SplatsReport)
 
 
 @job
@@ -1892,7 +1909,7 @@ def render_splats(
     threads: int | None = None,
     overwrite: bool = False,
     progress: Progress = None,
-) -> Report:
+) -> SplatRenderReport:
     """Look at splats through satellite images and perspective cameras.
 
     Args:
@@ -1923,8 +1940,7 @@ def render_splats(
         >>> import skysweep
         >>> report = skysweep.render_splats("splats.ply", "views", images=["left.tif"])
     """
-    result: Report = run_job("render_splats", locals())
-    return result
+    return run_job("render_splats", locals(), SplatRenderReport)
 
 
 @job
@@ -1937,7 +1953,7 @@ def convert_splats(
     threads: int | None = None,
     overwrite: bool = False,
     progress: Progress = None,
-) -> Report:
+) -> SplatConvertReport:
     """Bring splats to another format: PLY of 3DGS or 2DGS, SPZ, SOG, binary glTF.
 
     Args:
@@ -1963,8 +1979,7 @@ def convert_splats(
         >>> import skysweep
         >>> report = skysweep.convert_splats("splats.ply", "splats.spz", sh_degree=0)
     """
-    result: Report = run_job("convert_splats", locals())
-    return result
+    return run_job("convert_splats", locals(), SplatConvertReport)
 
 
 @job
@@ -1993,7 +2008,7 @@ def train(
     threads: int | None = None,
     overwrite: bool = False,
     progress: Progress = None,
-) -> Report:
+) -> TrainReport:
     """Train flat Gaussian splats on the images of a dataset, with building priors.
 
     Args:
@@ -2038,8 +2053,7 @@ def train(
         >>> import skysweep
         >>> report = skysweep.train("priors", "trained", iterations=3000, priors="both")
     """
-    result: Report = run_job("train", locals())
-    return result
+    return run_job("train", locals(), TrainReport)
 
 
 @job
@@ -2060,7 +2074,7 @@ def mesh(
     threads: int | None = None,
     overwrite: bool = False,
     progress: Progress = None,
-) -> Report:
+) -> MeshJobReport:
     """Fuse the depth maps of a dataset, or its splats, to a mesh.
 
     Args:
@@ -2092,8 +2106,7 @@ def mesh(
         >>> import skysweep
         >>> report = skysweep.mesh("priors", {"maps": "priors/raw_depth"}, "town.ply", voxel_m=0.5)
     """
-    result: Report = run_job("mesh", locals())
-    return result
+    return run_job("mesh", locals(), MeshJobReport)
 
 
 @job
@@ -2112,7 +2125,7 @@ def align(
     noise_output: PathLike | None = None,
     overwrite: bool = False,
     progress: Progress = None,
-) -> Report:
+) -> AlignJobReport:
     """Bring a COLMAP model to the world by GPS or point pairs.
 
     Args:
@@ -2144,8 +2157,7 @@ def align(
         >>> import skysweep
         >>> report = skysweep.align("sparse/0", "positions.csv", "aligned", crs_epsg=32631)
     """
-    result: Report = run_job("align", locals())
-    return result
+    return run_job("align", locals(), AlignJobReport)
 
 
 @job
@@ -2159,7 +2171,7 @@ def split(
     first: str | None = None,
     overwrite: bool = False,
     progress: Progress = None,
-) -> Report:
+) -> SplitJobReport:
     """Choose context and target views of a COLMAP model by their overlap.
 
     Args:
@@ -2187,8 +2199,7 @@ def split(
         >>> import skysweep
         >>> report = skysweep.split("sparse/0", contexts=2, output="split.json")
     """
-    result: Report = run_job("split", locals())
-    return result
+    return run_job("split", locals(), SplitJobReport)
 
 
 @job
@@ -2200,7 +2211,7 @@ def city_info(
     account: PathLike | None = None,
     overwrite: bool = False,
     progress: Progress = None,
-) -> Report:
+) -> CitySummary:
     """Describe a city model and its defects.
 
     Args:
@@ -2225,8 +2236,7 @@ def city_info(
         >>> report = skysweep.city_info("town.city.json", lod="2.2")
         >>> print(report.triangles)
     """
-    result: Report = run_job("city_info", locals())
-    return result
+    return run_job("city_info", locals(), CitySummary)
 
 
 @job
@@ -2240,7 +2250,7 @@ def city_convert(
     overwrite: bool = False,
     format: Literal["obj", "ply", "glb", "geojson", "cityjson"] | None = None,
     progress: Progress = None,
-) -> Report:
+) -> CityConvertReport:
     """Write a city model as triangles, footprints or objects.
 
     Args:
@@ -2266,8 +2276,7 @@ def city_convert(
         >>> import skysweep
         >>> report = skysweep.city_convert("town.city.json", "town.ply")
     """
-    result: Report = run_job("city_convert", locals())
-    return result
+    return run_job("city_convert", locals(), CityConvertReport)
 
 
 @job
@@ -2275,7 +2284,7 @@ def rpc_info(
     file: PathLike,
     *,
     progress: Progress = None,
-) -> Report:
+) -> RpcInfoReport:
     """Describe the RPC of a file.
 
     Args:
@@ -2293,8 +2302,7 @@ def rpc_info(
         >>> import skysweep
         >>> report = skysweep.rpc_info("left.tif")
     """
-    result: Report = run_job("rpc_info", locals())
-    return result
+    return run_job("rpc_info", locals(), RpcInfoReport)
 
 
 @job
@@ -2306,7 +2314,7 @@ def rpc_convert(
     corrections: PathLike | None = None,
     overwrite: bool = False,
     progress: Progress = None,
-) -> Report:
+) -> RpcConvertReport:
     """Write the RPC of a file in another format.
 
     Args:
@@ -2330,8 +2338,7 @@ def rpc_convert(
         >>> import skysweep
         >>> report = skysweep.rpc_convert("left.tif", "left.rpb")
     """
-    result: Report = run_job("rpc_convert", locals())
-    return result
+    return run_job("rpc_convert", locals(), RpcConvertReport)
 
 
 @job
@@ -2346,7 +2353,7 @@ def simulate(
     threads: int | None = None,
     overwrite: bool = False,
     progress: Progress = None,
-) -> Report:
+) -> SimulateReport:
     """Make a seeded scene seen through RPC cameras, with its exact surface. `scene` is a preset, a
     parameter file (TOML), or parameters that differ from those of the preset `town`.
 
@@ -2376,5 +2383,4 @@ def simulate(
         >>> report = skysweep.simulate({"size_m": 60.0, "views": 2}, "scene")
         >>> print(report.views)
     """
-    result: Report = run_job("simulate", locals())
-    return result
+    return run_job("simulate", locals(), SimulateReport)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from . import _jobs
-from ._call import PathLike, Progress, Report, path_of
+from ._call import PathLike, Progress, path_of
 from ._errors import InputError
+from .reports import ChunkEstimate, ChunkRunReport, DsmReport, PlanFile
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -16,6 +18,11 @@ if TYPE_CHECKING:
     from ._jobs import DsmSettings
 
 __all__ = ["Plan"]
+
+#: Report of a run, which is written last.
+_REPORT = ("report", "report.json")
+#: Rasters of a run.
+_RASTERS = ("dsm.tif", "sigma.tif", "views.tif", "confidence.tif", "filled.tif", "source.tif")
 
 
 class Plan:
@@ -37,7 +44,7 @@ class Plan:
     #: Folder of the run.
     folder: str
     #: The plan with its estimates, as ``plan.json`` has it.
-    content: Report
+    content: PlanFile
 
     def __init__(self, folder: Any) -> None:
         self.folder = os.path.abspath(path_of(folder))
@@ -60,29 +67,48 @@ class Plan:
 
     def __len__(self) -> int:
         """Number of chunks."""
-        return len(self.content["plan"]["chunks"])
+        return len(self.content.plan.chunks)
 
     @property
     def id(self) -> str:
         """Identity of the plan."""
-        return str(self.content["id"])
+        return self.content.id
 
     def needed_mb(self, chunk: int) -> int:
         """Estimated memory of a chunk, megabytes."""
-        return int(self._estimate(chunk)["needed_mb"])
+        return self._estimate(chunk).needed_mb
 
     def cpu_seconds(self, chunk: int) -> float:
         """Estimated processor time of a chunk, seconds; rough."""
-        return float(self._estimate(chunk)["cpu_seconds"])
+        return self._estimate(chunk).cpu_seconds
 
-    def _estimate(self, chunk: int) -> Any:
+    @property
+    def merge_mb(self) -> int:
+        """Estimated memory of the merge, megabytes."""
+        return self.content.estimate.merge_mb
+
+    def finished(self) -> DsmReport | None:
+        """The report of the run, where all its products are there, made of this plan, and no chunk is
+        void for an error; `None` otherwise."""
+        try:
+            with open(os.path.join(self.folder, *_REPORT), encoding="utf-8") as file:
+                report = DsmReport._of(json.load(file))
+        except (OSError, ValueError):
+            return None
+        places = [("dsm", name) for name in _RASTERS]
+        if self.content.plan.config.products:
+            places.append(("products", "report.json"))
+        is_whole = report.plan == self.id and not (report.chunks and report.chunks.failed)
+        return report if is_whole and all(os.path.isfile(os.path.join(self.folder, *place)) for place in places) else None
+
+    def _estimate(self, chunk: int) -> ChunkEstimate:
         if not 0 <= chunk < len(self):
             raise InputError(f"the plan has {len(self)} chunks and none with number {chunk}")
-        return self.content["estimate"]["chunks"][chunk]
+        return self.content.estimate.chunks[chunk]
 
     def run_chunk(
         self, chunk: int, *, threads: int | None = None, resume: bool = False, progress: Progress = None
-    ) -> Report:
+    ) -> ChunkRunReport:
         """Computes a chunk, unless it has a result or another process computes it.
 
         Returns:
@@ -99,7 +125,7 @@ class Plan:
         threads: int | None = None,
         resume: bool = False,
         progress: Progress = None,
-    ) -> Report:
+    ) -> ChunkRunReport:
         """Computes several chunks: numbers, a share (``"2/5"``), or all that nobody computes."""
         if chunks is not None and not isinstance(chunks, str):
             chunks = ",".join(str(int(chunk)) for chunk in chunks)
@@ -112,7 +138,7 @@ class Plan:
         overwrite: bool = False,
         threads: int | None = None,
         progress: Progress = None,
-    ) -> Report:
+    ) -> DsmReport:
         """Makes the surface model of the chunks; returns the report of the run.
 
         Args:
