@@ -17,8 +17,8 @@ use super::wall::Walls;
 /// 0.5 m is a wall.
 pub const STEP_SLOPE: f32 = 1.6;
 
-/// Sides of the blocks whose highest cell is kept, cells: the large ones pass over flat country, the
-/// small ones between buildings.
+/// Sides of the blocks whose highest cell is kept, cells: the large ones pass over flat country,
+/// the small ones between buildings.
 const BLOCKS: [usize; 2] = [16, 4];
 /// Steps of the line of sight per cell.
 const STEPS_PER_CELL: f64 = 8.0;

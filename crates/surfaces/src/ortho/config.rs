@@ -7,17 +7,13 @@ use ortho::MosaicRule;
 use serde::{Deserialize, Serialize};
 
 use super::error::OrthoError;
-use super::mosaic::Laying;
+use super::laying::{Laying, TOLERANCE_M};
 use job::corrections::CorrectionSource;
 use job::error::SettingError;
 use job::run_folder::surface_file;
 
 /// Most images of an ortho: the mask holds their numbers as bytes.
 const IMAGES_MAX: usize = 255;
-
-/// Height by which a surface must stand above a line of sight to hide what is behind it, metres:
-/// the errors of f32 heights and of the line of sight are far below it.
-pub(super) const TOLERANCE_M: f64 = 0.05;
 
 /// An ortho of one or more images on a surface model.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -11,6 +11,7 @@
 mod config;
 mod error;
 mod inputs;
+mod laying;
 mod mosaic;
 mod output;
 mod run;

@@ -10,6 +10,7 @@ use rayon::prelude::*;
 
 use super::error::OrthoError;
 use super::inputs::{OrthoGrid, OrthoInputs, Pixels};
+use super::laying::Laying;
 use super::states::{HIDDEN, OUTSIDE, OrthoCounts, SEEN, VOID};
 use super::view::{Cell, Seen, look};
 
@@ -21,16 +22,6 @@ const COMPARED: usize = 60_000;
 /// are soft shadows of the seam over a few cells; over many, the images would be mixed where they
 /// do not match to the pixel.
 const FEATHER_CELLS: usize = 16;
-
-/// How images are laid on a surface.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Laying {
-    /// As in the configuration of an ortho.
-    pub(super) tolerance_m: f64,
-    pub(super) balance: bool,
-    pub(super) mosaic: MosaicRule,
-    pub(super) keep_hidden: bool,
-}
 
 /// An ortho.
 pub(crate) struct Ortho {

@@ -4,10 +4,11 @@ use numeric::Progress;
 use ortho::MosaicRule;
 use raster::Window;
 
-use super::config::{OrthoConfig, TOLERANCE_M};
+use super::config::OrthoConfig;
 use super::error::OrthoError;
 use super::inputs::{OrthoImage, OrthoInputs, OrthoSurface, Pixels};
-use super::mosaic::{Laying, Ortho};
+use super::laying::{Laying, TOLERANCE_M};
+use super::mosaic::Ortho;
 use super::output::OrthoReport;
 use super::{mosaic, output};
 use job::corrections::Corrections;
