@@ -102,8 +102,8 @@ fn tiles_of_worldview_are_one_image() {
     assert!(image.acquired_s().is_some_and(|time| time / 3600 == 1_451_656_800 / 3600), "{:?}", image.acquired_s());
 }
 
-/// Pléiades, Pléiades Neo, SPOT: `DIM_NAME.XML` lists the tiles `IMG_NAME_R1C1.TIF` …, the RPC is in
-/// `RPC_NAME.XML` and counts pixels from 1, or from 0 for Pléiades Neo.
+/// Pléiades, Pléiades Neo, SPOT: `DIM_NAME.XML` lists the tiles `IMG_NAME_R1C1.TIF` …, the RPC is
+/// in `RPC_NAME.XML` and counts pixels from 1, or from 0 for Pléiades Neo.
 #[test]
 fn tiles_of_pleiades_are_one_image() {
     for (profile, first) in [("PHR_SENSOR", 1.0), ("PNEO_SENSOR", 0.0)] {
