@@ -11,8 +11,8 @@ use io::rpc::{RpcFormat, read_for_image};
 use raster::{Grid, Window};
 use tempfile::TempDir;
 
-/// Columns and rows of a tile of the first column and row.
-const TILE: [usize; 2] = [256, 224];
+/// Columns and rows of the first tile; those of the last column and row are smaller.
+const TILE: [usize; 2] = [448, 512];
 
 fn town() -> (ImageSource, Rpc) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../data-samples/town/view_1.tif");
