@@ -316,8 +316,8 @@ mod tests {
     #[test]
     fn damaged_files_are_refused_or_read() {
         assert!(read_bytes(b"PAR1 and nothing", "").is_err());
-        // A byte of every third place in turn; the reader of the format may find nothing wrong.
-        for at in (0..FILE.len()).step_by(3) {
+        // A byte of every eleventh place in turn; the reader of the format may find nothing wrong.
+        for at in (0..FILE.len()).step_by(11) {
             let mut bytes = FILE.to_vec();
             bytes[at] ^= 0xa5;
             let _ = read_bytes(&bytes, "name");

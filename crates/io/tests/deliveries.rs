@@ -11,8 +11,8 @@ use io::rpc::{RpcFormat, read_for_image};
 use raster::{Grid, Window};
 use tempfile::TempDir;
 
-/// Columns and rows of a tile of the first column and row.
-const TILE: [usize; 2] = [256, 224];
+/// Columns and rows of the first tile; those of the last column and row are smaller.
+const TILE: [usize; 2] = [448, 512];
 
 fn town() -> (ImageSource, Rpc) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../data-samples/town/view_1.tif");
@@ -102,8 +102,8 @@ fn tiles_of_worldview_are_one_image() {
     assert!(image.acquired_s().is_some_and(|time| time / 3600 == 1_451_656_800 / 3600), "{:?}", image.acquired_s());
 }
 
-/// Pléiades, Pléiades Neo, SPOT: `DIM_NAME.XML` lists the tiles `IMG_NAME_R1C1.TIF` …, the RPC is in
-/// `RPC_NAME.XML` and counts pixels from 1, or from 0 for Pléiades Neo.
+/// Pléiades, Pléiades Neo, SPOT: `DIM_NAME.XML` lists the tiles `IMG_NAME_R1C1.TIF` …, the RPC is
+/// in `RPC_NAME.XML` and counts pixels from 1, or from 0 for Pléiades Neo.
 #[test]
 fn tiles_of_pleiades_are_one_image() {
     for (profile, first) in [("PHR_SENSOR", 1.0), ("PNEO_SENSOR", 0.0)] {

@@ -16,7 +16,7 @@ pub fn nearest_name<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) ->
     let is_part = |other: &str| name.len() >= 3 && (other.starts_with(&name) || name.starts_with(other));
     let distance = |other: &str| {
         let other = other.to_ascii_lowercase();
-        if is_part(&other) { 1 } else { edits(&name, &other) }
+        if is_part(&other) && other != name { 1 } else { edits(&name, &other) }
     };
     let best = known.into_iter().map(|other| (distance(other), other)).min()?;
     // A third of the letters, and two of a short name, may be wrong, but not all of them.

@@ -91,12 +91,13 @@ fn rank(stem: &str, full: &str, name: &str) -> Option<usize> {
     plain.or_else(aux).or_else(|| dimap(stem, name)).or_else(|| alos(stem, name))
 }
 
-/// Ranks DIMAP names: `rpc_X.xml` fits `img_X_r1c1`, also with more at the end of X (`_p` of
-/// Pléiades Neo).
+/// Ranks DIMAP names: `rpc_X.xml` fits `dim_X`, which stands for all tiles, and `img_X_r1c1`, also
+/// with more at the end of X (`_p` of Pléiades Neo).
 ///
 /// It does not fit other tiles, because the RPC file does not have their position in the scene.
 fn dimap(stem: &str, name: &str) -> Option<usize> {
-    let scene = stem.strip_prefix("img_")?.strip_suffix("_r1c1")?;
+    let first_tile = || stem.strip_prefix("img_")?.strip_suffix("_r1c1");
+    let scene = stem.strip_prefix("dim_").or_else(first_tile)?;
     let of_rpc = name.strip_prefix("rpc_")?.strip_suffix(".xml")?;
     let rest = scene.strip_prefix(of_rpc)?;
     (rest.is_empty() || rest.starts_with('_')).then_some(ENDINGS.len() + 1 + rest.len())

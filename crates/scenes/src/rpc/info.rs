@@ -1,5 +1,5 @@
-//! Describing an RPC: offsets, validity box, ground sampling distance and viewing direction, and the
-//! image that it belongs to.
+//! Describing an RPC: offsets, validity box, ground sampling distance and viewing direction, and
+//! the image that it belongs to.
 //!
 //! The ground sampling distance and the viewing direction hold at the centre of the RPC's domain,
 //! at the height offset. The incidence is the angle at the ground between the vertical and the
