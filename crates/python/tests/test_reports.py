@@ -67,7 +67,7 @@ def test_reports_are_what_their_classes_declare(run: Path, tmp_path: Path) -> No
         skysweep.priors(model, VIEWS[:1], tmp_path / "maps"),
         skysweep.priors(model, [TOWN / "cameras"], tmp_path / "priors"),
         skysweep.splats(run, VIEWS, tmp_path / "splats.ply"),
-        skysweep.convert_splats(tmp_path / "splats.ply", tmp_path / "splats.spz"),
+        skysweep.convert_splats(tmp_path / "splats.ply", tmp_path / "packed.spz"),
         skysweep.city_info(model),
         skysweep.city_convert(model, tmp_path / "town.ply"),
         skysweep.rpc_info(VIEWS[0]),
