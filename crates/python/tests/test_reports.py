@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import keyword
 import pickle
 from pathlib import Path
 from typing import Any, Iterator
@@ -34,9 +35,10 @@ def wrong(report: Report) -> list[str]:
             continue
         known = {name for name in kind.__annotations__ if not name.startswith("_")}
         open_ended = kind in (reports.EvalMetrics, reports.PartMetrics)
-        methods = {key for key in part if hasattr(dict, key)} | {key for key in part if not key.isidentifier()}
+        # Words of the language and methods of dictionaries are read as keys.
+        by_key = {key for key in part if hasattr(dict, key) or not key.isidentifier() or keyword.iskeyword(key)}
         if not open_ended:
-            found += [f"{place}.{key} is not declared by {kind.__name__}" for key in part.keys() - known - methods]
+            found += [f"{place}.{key} is not declared by {kind.__name__}" for key in part.keys() - known - by_key]
         found += [f"{place} has no {name}" for name in known if name not in part and name not in kind._absent]
     return found
 
