@@ -142,7 +142,7 @@ def test_a_run_that_another_process_locks_is_waited_for(
     threading.Timer(1.5, os.close, [held]).start()
     with in_process() as client:
         report = cluster.run(plan, client)
-    assert report.dask.waited >= len(plan) and report.dask.computed == len(plan)
+    assert report.dask.waited > 0 and report.dask.computed == len(plan)
     assert rasters(tmp_path / "run") == once
 
 

@@ -62,7 +62,8 @@ def reference() -> str:
     def rows(entries: list[tuple[str, Any]]) -> str:
         def line(name: str, value: Any) -> str:
             text = re.sub(r":\w+:`~?([\w.]+)`", r"`\1`", (inspect.getdoc(value) or "").split("\n\n")[0])
-            return f"| `{name}` | {' '.join(text.replace('``', '`').split())} |\n"
+            first = " ".join(text.replace("``", "`").split()).split(". ")[0].rstrip(".")
+            return f"| `{name}` | {first} |\n"
 
         return "| name | what it is |\n|---|---|\n" + "".join(line(*entry) for entry in entries)
 

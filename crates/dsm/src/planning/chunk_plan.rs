@@ -244,8 +244,8 @@ impl ChunkPlanner<'_> {
     /// found are used as well, because small things are lost on coarse levels.
     fn heights(&self, windows: &[Option<Window>], sources: &[Vec<usize>]) -> Result<HeightRange, DsmError> {
         let wide = self.wide_range();
-        // What a sweep finds is at least a margin high after it was cut, so it saves no levels of so
-        // few given heights, and the sweep, which takes nearly all of the time, changes nothing.
+        // What a sweep finds is at least a margin high after it was cut, so it saves no levels of
+        // so few given heights, and the sweep, which takes nearly all time, changes nothing.
         if self.config.height_range_m.is_some() && f64::from(1u32 << LEVELS_SAVED) * MARGIN_M > self.range.span_m() {
             return Ok(self.range);
         }

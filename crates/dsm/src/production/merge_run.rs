@@ -56,9 +56,9 @@ impl MergeConfig {
 ///
 /// # Errors
 /// [`ProductionError::NoPlan`], [`ProductionError::Plan`], [`ProductionError::OtherVersion`],
-/// [`ProductionError::OtherPlan`], [`ProductionError::ConfigChanged`]; [`ProductionError::ChunksMissing`] and
-/// [`ProductionError::ChunkDamaged`] unless a partial result is allowed;
-/// [`ProductionError::NothingDone`]; [`ProductionError::Dsm`] for products that exist,
+/// [`ProductionError::OtherPlan`], [`ProductionError::ConfigChanged`];
+/// [`ProductionError::ChunksMissing`] and [`ProductionError::ChunkDamaged`] unless a partial result
+/// is allowed; [`ProductionError::NothingDone`]; [`ProductionError::Dsm`] for products that exist,
 /// for a folder in which chunks are computed, for what cannot be read or written, and when
 /// cancelled. Nothing is left half-written.
 pub fn merge_run(config: &MergeConfig, progress: &dyn Progress) -> Result<Product, ProductionError> {

@@ -13,7 +13,7 @@ use crate::production::content_hash;
 use crate::production::error::ProductionError;
 use crate::production::estimate::PlanEstimate;
 use crate::production::input_files::{self, InputFile};
-use crate::production::plan_cache::{keep, kept, stamp};
+use crate::production::plan_cache::{LastRead, stamp};
 use crate::{DsmConfig, Plan, USED_CONFIG, files_of, open};
 use job::files::TEXT_LIMIT;
 use job::job_paths::{relative, resolved};
@@ -22,6 +22,9 @@ use job::job_paths::{relative, resolved};
 pub const PLAN: &str = "plan.json";
 /// Name of the pointing corrections with their residuals, which later runs can use.
 pub const POINTING: &str = "pointing.json";
+
+/// The plan that this process read last.
+static LAST: LastRead<PlanFile> = LastRead::new();
 
 /// The plan of a run with the files that it rests on.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -76,11 +79,11 @@ impl PlanFile {
     /// edited or whose parts do not fit each other, [`ProductionError::OtherVersion`].
     pub fn read(folder: &Path) -> Result<Arc<Self>, ProductionError> {
         let stamp = stamp(&folder.join(PLAN));
-        if let Some(known) = kept(folder, stamp) {
+        if let Some(known) = LAST.kept(folder, stamp) {
             return Ok(known);
         }
         let file = Arc::new(Self::parsed(folder)?);
-        keep(folder, stamp, &file);
+        LAST.keep(folder, stamp, &file);
         Ok(file)
     }
 

@@ -100,7 +100,7 @@ def _typed(owner: type[Report], name: str, value: Any) -> Any:
     if not isinstance(value, dict):
         return value
     if name.startswith("*"):
-        return {key: _typed(owner, name[1:], item) for key, item in value.items()}
+        return Report({key: _typed(owner, name[1:], item) for key, item in value.items()})
     known = [getattr(sys.modules[owner.__module__], one) for one in name.split("|") if one]
     # Of several classes the one that has attributes for most of the keys.
     fitting = max(known, key=lambda one: len(one.__annotations__.keys() & value.keys()), default=Report)
