@@ -14,6 +14,7 @@ use ::eval::AlignmentMethod;
 use ::simulate::SimulationConfig;
 use crs::{HeightConverter, MapProjection, VerticalDatum};
 use geodesy::TransverseMercator;
+use job::error_text::with_causes;
 use numeric::{Cancelled, Progress, Silent};
 use serde::{Deserialize, Serialize};
 
@@ -188,10 +189,10 @@ fn formats() -> Result<(SelftestState, String), String> {
 fn projections() -> Result<(SelftestState, String), String> {
     let mut worst_m = 0.0_f64;
     for (lon, lat, middle, code) in [(5.4, 43.5, 3.0, 32631), (-81.66, 30.35, -81.0, 32617)] {
-        let projection = MapProjection::from_epsg(code).map_err(|e| chain(&e))?;
-        let found = projection.map_from_lonlat(lon, lat).map_err(|e| chain(&e))?;
+        let projection = MapProjection::from_epsg(code).map_err(|e| with_causes(&e))?;
+        let found = projection.map_from_lonlat(lon, lat).map_err(|e| with_causes(&e))?;
         let formulas = TransverseMercator::new(middle, 0.0, UTM_SCALE).and_then(|map| map.map_from_lonlat(lon, lat));
-        let formulas = formulas.map_err(|e| chain(&e))?;
+        let formulas = formulas.map_err(|e| with_causes(&e))?;
         worst_m = worst_m.max((found.x - formulas.x - UTM_EASTING_M).hypot(found.y - formulas.y));
     }
     if worst_m <= MAP_MAX_M {
@@ -226,19 +227,19 @@ fn surface(folder: Option<&Path>) -> Result<(SelftestState, String), String> {
     let folder = folder.map_or_else(|| builder.tempdir(), |folder| builder.tempdir_in(folder));
     let folder = folder.map_err(|e| format!("cannot make a folder for temporary files: {e}"))?;
     let at = |name: &str| folder.path().join(name);
-    let mut scene = SimulationConfig::preset("town").map_err(|e| chain(&e))?;
+    let mut scene = SimulationConfig::preset("town").map_err(|e| with_causes(&e))?;
     (scene.size_m, scene.gsd_m, scene.views) = (TOWN_M, GSD_M, 3);
-    scenes::simulate::run(&SimulateConfig::new(scene, at("town")), &Silent).map_err(|e| chain(&e))?;
+    scenes::simulate::run(&SimulateConfig::new(scene, at("town")), &Silent).map_err(|e| with_causes(&e))?;
     let images: Vec<PathBuf> = (1..=3).map(|view| at(&format!("town/view_{view}.tif"))).collect();
     let truth = at("town/truth/dsm.tif");
-    let known = io::raster::read_dem(&truth).map_err(|e| chain(&e))?;
+    let known = io::raster::read_dem(&truth).map_err(|e| with_causes(&e))?;
     let heights = known.heights.data().iter().filter(|height| height.is_finite()).map(|height| f64::from(*height));
     let [low, high] = heights.fold([f64::MAX, f64::MIN], |[low, high], h| [low.min(h), high.max(h)]);
     for (name, threads) in [("one", Some(1)), ("all", None)] {
         let mut config = DsmConfig::new(images.clone(), at(name));
         config.threads = threads;
         config.height_range_m = Some(HeightRange::new(low - 10.0, high + 10.0));
-        dsm::run(&config, &Silent).map_err(|e| chain(&e))?;
+        dsm::run(&config, &Silent).map_err(|e| with_causes(&e))?;
     }
     let bytes = |name: &str| std::fs::read(at(name).join("dsm/dsm.tif")).map_err(|e| e.to_string());
     if bytes("one")? != bytes("all")? {
@@ -247,7 +248,7 @@ fn surface(folder: Option<&Path>) -> Result<(SelftestState, String), String> {
     let mut config = GridEvalConfig::new(at("all/dsm/dsm.tif"), truth);
     config.alignment = AlignmentMethod::Xyz;
     config.target = EvalTarget::Nowhere;
-    let metrics = compare_grids(&config, &Silent).map_err(|e| chain(&e))?.evaluation.overall;
+    let metrics = compare_grids(&config, &Silent).map_err(|e| with_causes(&e))?.evaluation.overall;
     let covered = metrics.n as f64 / metrics.reference_cells.max(1) as f64;
     let error_m = metrics.errors.map_or(f64::INFINITY, |errors| errors.le68);
     let found = format!(
@@ -259,10 +260,4 @@ fn surface(folder: Option<&Path>) -> Result<(SelftestState, String), String> {
         return Ok((SelftestState::Passed, found + ", the same bytes with one thread and with all"));
     }
     Err(format!("{found}, expected at least {:.0} % and at most {expected} m", COVERED_MIN * 100.0))
-}
-
-/// Returns an error with its causes.
-fn chain(error: &dyn std::error::Error) -> String {
-    let causes = std::iter::successors(Some(error), |error| error.source());
-    causes.map(ToString::to_string).collect::<Vec<_>>().join(": ")
 }
