@@ -5,7 +5,7 @@
 //! in the changelog. Configurations and reports may gain fields. The crates behind them may change
 //! in any version.
 //!
-//! Jobs are modules with a function `run`, as in [`dsm::run`](jobs::dsm::run):
+//! Jobs are modules with a function `run`, as in [`dsm::run`]:
 //! ```
 //! use skysweep::prelude::*;
 //!

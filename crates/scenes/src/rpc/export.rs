@@ -267,7 +267,7 @@ impl Export<'_> {
         }
         let place = self.folder.join(CAMERAS).join(format!("{name}.json"));
         files::write_json(&place, &record, false)?;
-        Ok(([window.width, window.height], [window.x as i64, window.y as i64], fit.max_px))
+        Ok(([window.width, window.height], [window.x, window.y], fit.max_px))
     }
 
     /// Returns the part of an image that shows the ground of the surface model, or all of it.
