@@ -1,11 +1,10 @@
-//! One module per command: its arguments, and what it prints.
+//! One module per command that does a job: its arguments, and what it prints.
 
 pub(crate) mod align;
 pub(crate) mod batch;
 pub(crate) mod buildings;
 pub(crate) mod city;
 pub(crate) mod classes;
-pub(crate) mod completions;
 pub(crate) mod diff;
 pub(crate) mod dsm;
 pub(crate) mod dtm;

@@ -5,6 +5,7 @@
 //! complete, 1 finished with failed parts or below a requested threshold, 2 bad input or I/O error.
 
 mod commands;
+mod completions;
 mod corrections;
 mod error;
 mod global;
@@ -20,8 +21,8 @@ use std::process::ExitCode;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use crate::commands::{
-    align, batch, buildings, city, classes, completions, diff, dsm, dtm, eval, groundview, heightmap, mesh, ortho,
-    priors, production, products, register, rpc, selftest, simulate, splats, split, tiles, train, view,
+    align, batch, buildings, city, classes, diff, dsm, dtm, eval, groundview, heightmap, mesh, ortho, priors,
+    production, products, register, rpc, selftest, simulate, splats, split, tiles, train, view,
 };
 use crate::global::{Global, Outcome};
 

@@ -176,7 +176,7 @@ fn formats() -> Result<(SelftestState, String), String> {
     if !missing.is_empty() {
         return Err(format!("GDAL was built without {}, expected {}", missing.join(", "), REQUIRED.join(", ")));
     }
-    let without = DELIVERIES.iter().filter(|(_, drivers)| !drivers.iter().any(|driver| has(&driver)));
+    let without = DELIVERIES.iter().filter(|(_, drivers)| !drivers.iter().any(&has));
     let without: Vec<&str> = without.map(|(name, _)| *name).collect();
     Ok(if without.is_empty() {
         (SelftestState::Passed, format!("{} of GDAL, those of deliveries among them", known.len()))

@@ -132,6 +132,7 @@ __all__ = [
     "RpcCentre",
     "RpcConvertReport",
     "RpcInfoReport",
+    "RpcPixels",
     "RpcValidity",
     "SatelliteRow",
     "SceneImage",
@@ -3444,6 +3445,9 @@ class RpcInfoReport(Report):
     warnings: list[str]
     """Warnings of the reader, such as conventions that it had to guess."""
 
+    image: RpcPixels | None
+    """The image, where the file holds one."""
+
     rpc: Rpc
     """The model."""
 
@@ -3453,7 +3457,42 @@ class RpcInfoReport(Report):
     centre: RpcCentre | None
     """Geometry at the centre of the domain; absent where the model cannot be inverted there."""
 
-    _parts = {"rpc": "Rpc", "validity": "RpcValidity", "centre": "RpcCentre"}
+    _parts = {"image": "RpcPixels", "rpc": "Rpc", "validity": "RpcValidity", "centre": "RpcCentre"}
+
+
+class RpcPixels(Report):
+    """The image of an RPC."""
+
+    width: int
+    """Columns."""
+
+    height: int
+    """Rows."""
+
+    bands: list[str]
+    """Names of the bands; empty for a band without one."""
+
+    sample: str
+    """Type of the stored samples."""
+
+    bits: int | None
+    """Significant bits of a sample, where the file says."""
+
+    footprint_deg: list[list[float]] | None
+    """Corners of the image on the ground at the height offset of the RPC, longitude and latitude
+    in degrees: upper left, upper right, lower right, lower left. Absent where the model has no
+    answer for one of them."""
+
+    acquired: str | None
+    """When the image was taken, UTC in the form of ISO 8601; absent where the file does not say."""
+
+    satellite: str | None
+    """The satellite; absent where the file does not say."""
+
+    sun: SunPosition | None
+    """Where the sun stood; absent where the file does not say."""
+
+    _parts = {"sun": "SunPosition"}
 
 
 class RpcValidity(Report):
