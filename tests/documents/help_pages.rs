@@ -41,7 +41,7 @@ fn slips_are_answered_with_the_nearest_name() {
     std::fs::write(&job, "images = []\noutput = 'out'\npreset = 'acurate'\n").unwrap();
     let job = job.to_string_lossy().into_owned();
     let slips: [(&[&str], &str); 8] = [
-        (&["dms"], "dsm"),
+        (&["dsmm"], "dsm"),
         (&["splats", "rendr"], "render"),
         (&["dsm", "a.tif", "b.tif", "-o", "out", "--presett", "fast"], "--preset"),
         (&["dsm", "a.tif", "b.tif", "-o", "out", "--preset", "acurate"], "accurate"),

@@ -140,7 +140,7 @@ impl RpcExportReport {
 /// an unknown sun or range of heights, a folder that holds something else.
 ///
 /// ```
-/// use jobs::rpc::{RpcExportConfig, export};
+/// use scenes::rpc::{RpcExportConfig, export};
 /// let town = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data-samples/town");
 /// let folder = tempfile::tempdir()?;
 /// let views = ["view_1.tif", "view_2.tif"].map(|view| std::path::Path::new(town).join(view));
