@@ -300,7 +300,8 @@ fn inputs_that_have_no_effect_are_told() {
     refused(command, &out, "longitudes 6.3986° to 6.4014°");
     let good = folder.path().join("good.geojson");
     polygon(&good, [5.3986, 43.529, 5.3995, 43.531]);
-    let mut command = small(&out);
+    let mut command = skysweep();
+    command.arg("dsm").arg(town("view_1.tif")).arg(town("view_3.tif")).arg("-o").arg(&out).args(["--gsd", "1"]);
     [&swapped, &far, &good].into_iter().for_each(|mask| {
         command.arg("--mask").arg(mask);
     });

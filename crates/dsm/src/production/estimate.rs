@@ -52,8 +52,12 @@ impl PlanEstimate {
             let swept: f64 = sweep.windows.iter().zip(&sweep.sources).map(|(w, s)| pixels(w) * s.len() as f64).sum();
             ChunkEstimate { needed_mb: sweep.needed_mb, cpu_seconds: swept * 1e-6 * SECONDS_PER_MPX * share }
         };
-        let largest =
-            plan.chunks.iter().map(|chunk| chunk.core.width as u64 * chunk.core.height as u64).max().unwrap_or(0);
+        let largest = plan
+            .chunks
+            .iter()
+            .map(|chunk| (chunk.core.width as u64).saturating_mul(chunk.core.height as u64))
+            .max()
+            .unwrap_or(0);
         let chunks: Vec<ChunkEstimate> = plan.chunks.iter().map(|chunk| one(&chunk.work)).collect();
         Self {
             peak_mb: chunks.iter().map(|chunk| chunk.needed_mb).max().unwrap_or(0),

@@ -101,6 +101,8 @@ struct Writer {
     known: Written,
     classes: BTreeMap<String, String>,
     begun: BTreeSet<String>,
+    /// The names of the types that structures with an open type were given last.
+    given: BTreeMap<String, String>,
 }
 
 impl Writer {
@@ -157,7 +159,10 @@ impl Writer {
             _ if name.trim_start_matches(['u', 'i']).parse::<u8>().is_ok() || name.ends_with("size") => {
                 Typed::plain("int")
             }
-            _ => self.named(name),
+            _ => match self.given.get(name).cloned() {
+                Some(given) => self.of_name(&given, &[]),
+                None => self.named(name),
+            },
         }
     }
 
@@ -293,13 +298,23 @@ impl Writer {
     fn inlined_as_is(&mut self, ty: &Type) -> Vec<Attributed> {
         let Type::Path(path) = ty else { panic!("what is flattened has a name") };
         let last = path.path.segments.last().expect("a type has a name");
-        if let PathArguments::AngleBracketed(inner) = &last.arguments {
-            let Some(GenericArgument::Type(inner)) = inner.args.first() else { panic!("a type in {}", last.ident) };
-            return self.inlined_as_is(inner);
-        }
         let name = last.ident.to_string();
+        let inner = match &last.arguments {
+            PathArguments::AngleBracketed(inner) => inner.args.first(),
+            _ => None,
+        };
         if let Some(item) = self.known.structs.get(&name).cloned() {
+            // The structure may leave the type of a field open.
+            let parameter = item.generics.type_params().next().map(|open| open.ident.to_string());
+            if let (Some(parameter), Some(GenericArgument::Type(Type::Path(given)))) = (parameter, inner) {
+                let given = given.path.segments.last().expect("a type has a name");
+                self.given.insert(parameter, given.ident.to_string());
+            }
             return self.attributes(&item);
+        }
+        if let Some(inner) = inner {
+            let GenericArgument::Type(inner) = inner else { panic!("a type in {name}") };
+            return self.inlined_as_is(inner);
         }
         match self.known.enums.get(&name).cloned() {
             Some(item) if option(&item.attrs, "tag").is_some() => self.of_tagged(&item),
@@ -392,7 +407,7 @@ pub(crate) fn made(crates: &Path, reports: &[&str]) -> String {
         }
     }
     known.add(syn::parse_file(include_str!("shapes.rs")).expect("valid Rust").items);
-    let mut writer = Writer { known, classes: BTreeMap::new(), begun: BTreeSet::new() };
+    let mut writer = Writer { known, classes: BTreeMap::new(), begun: BTreeSet::new(), given: BTreeMap::new() };
     for report in reports.iter().filter(|name| **name != "String") {
         writer.named(report);
     }
