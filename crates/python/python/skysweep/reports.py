@@ -48,6 +48,7 @@ __all__ = [
     "ControlPointReport",
     "ControlReport",
     "Cumulative",
+    "CurvePoint",
     "DamagedBuilding",
     "Date",
     "DepthSource",
@@ -79,6 +80,7 @@ __all__ = [
     "GroundViewFailure",
     "GroundViewReport",
     "GroundViewRow",
+    "HeightErrors",
     "HeightMapRecord",
     "HeightMapReport",
     "HeightMapTags",
@@ -153,6 +155,7 @@ __all__ = [
     "SplatConvertReport",
     "SplatRenderReport",
     "SplatRenderView",
+    "SplatsImageReport",
     "SplatsReport",
     "SplitImage",
     "SplitJobReport",
@@ -1071,6 +1074,19 @@ class Cumulative(Report):
     """Number of cells with at most that error."""
 
 
+class CurvePoint(Report):
+    """Splats of one size."""
+
+    side: int
+    """Side of the squares, cells."""
+
+    splats: int
+    """Number of splats."""
+
+    rmse_m: float
+    """Root mean square error of mean heights, metres."""
+
+
 class DamagedBuilding(Report):
     """A building of which too little is right."""
 
@@ -1987,6 +2003,25 @@ class GroundViewRow(Report):
 
     depth_range_m: list[float] | None
     """Least and greatest depth, metres."""
+
+
+class HeightErrors(Report):
+    """Errors of rendered heights, metres."""
+
+    cells: int
+    """Number of cells compared."""
+
+    rmse_m: float
+    """Root mean square error."""
+
+    mae_m: float
+    """Mean absolute error."""
+
+    median_m: float
+    """Median absolute error."""
+
+    share: float
+    """Share of the surface's cells that have a rendered height."""
 
 
 class HeightMapRecord(Report):
@@ -3954,8 +3989,8 @@ class SplatRenderView(Report):
     """Structural similarity with the picture, where there is a picture, over the covered pixels."""
 
 
-class SplatsReport(Report):
-    """Number of splats, and how well they stand for the surface and the images."""
+class SplatsImageReport(Report):
+    """How well the splats render back into one image."""
 
     seen: float
     """Share of the cells with a height that the view sees."""
@@ -3981,6 +4016,48 @@ class SplatsReport(Report):
     image: str
     """The image."""
 
+
+class SplatsReport(Report):
+    """Number of splats, and how well they stand for the surface and the images."""
+
+    cells: int
+    """Number of cells with a height."""
+
+    splats: int
+    """Number of splats, walls included."""
+
+    walls: int
+    """Number of splats on walls."""
+
+    walls_seen: int
+    """Number of splats on walls whose colours an image shows. The others have the mean of the
+    walls that are seen on the same outline, or of all."""
+
+    walls_area_m2: float
+    """Area of the walls, m²."""
+
+    plane_error_max_m: float
+    """Largest distance of a height from the plane of its splat, metres."""
+
+    mean_height: HeightErrors | None
+    """Errors of the heights rendered from above, without the walls, as the mean by weight."""
+
+    median_height: HeightErrors | None
+    """Errors of the heights rendered from above, without the walls, at half of the weight."""
+
+    display_range: list[list[float]]
+    """Values of the reference image at 0 and 1 of the display range, per channel."""
+
+    views: list[SplatsImageReport]
+    """How well the splats render back into each image."""
+
+    uniform: list[CurvePoint]
+    """Uniform splats of several sizes, when asked for."""
+
+    uniform_at_equal_rmse: float | None
+    """Number of uniform splats with the same root mean square error of mean heights, when asked
+    for: interpolated in the logarithms, at most one per cell."""
+
     output: str
     """File that was written."""
 
@@ -3989,6 +4066,8 @@ class SplatsReport(Report):
 
     colour_bound: float
     """Bound on the colours that was asked for, as a share of the display range."""
+
+    _parts = {"mean_height": "HeightErrors", "median_height": "HeightErrors", "views": "SplatsImageReport", "uniform": "CurvePoint"}
 
 
 class SplitImage(Report):
