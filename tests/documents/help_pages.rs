@@ -42,7 +42,7 @@ fn slips_are_answered_with_the_nearest_name() {
     let job = job.to_string_lossy().into_owned();
     let slips: [(&[&str], &str); 8] = [
         (&["dsmm"], "dsm"),
-        (&["splats", "rendr"], "render"),
+        (&["rpc", "infoo"], "info"),
         (&["dsm", "a.tif", "b.tif", "-o", "out", "--presett", "fast"], "--preset"),
         (&["dsm", "a.tif", "b.tif", "-o", "out", "--preset", "acurate"], "accurate"),
         (&["products", "run", "--only", "cloud,contour"], "contours"),

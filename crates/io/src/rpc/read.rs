@@ -92,7 +92,12 @@ pub fn read_for_image(path: &Path) -> Result<RpcFile, RpcReadError> {
         match image::open(path) {
             Ok(opened) => {
                 if let Some(file) = image::read(path, &opened)? {
-                    return Ok(file);
+                    // GDAL 3.6 takes the tiles of Pléiades Neo to count pixels from 1.
+                    let beside = match sidecar::is_first_tile(path) {
+                        true => sidecar::read(path, Some(&opened), &mut tried)?,
+                        false => None,
+                    };
+                    return Ok(beside.unwrap_or(file));
                 }
                 tried.push(no_metadata());
                 dataset = Some(opened);

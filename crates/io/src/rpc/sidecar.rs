@@ -91,6 +91,12 @@ fn rank(stem: &str, full: &str, name: &str) -> Option<usize> {
     plain.or_else(aux).or_else(|| dimap(stem, name)).or_else(|| alos(stem, name))
 }
 
+/// Whether a file has the name of the first tile of a DIMAP product, `IMG_X_R1C1`.
+pub(super) fn is_first_tile(image: &Path) -> bool {
+    let stem = image.file_stem().unwrap_or_default().to_string_lossy().to_lowercase();
+    stem.starts_with("img_") && stem.ends_with("_r1c1")
+}
+
 /// Ranks DIMAP names: `rpc_X.xml` fits `dim_X`, which stands for all tiles, and `img_X_r1c1`, also
 /// with more at the end of X (`_p` of Pléiades Neo).
 ///
