@@ -36,9 +36,9 @@ REFUSED = {
 FORMATS = [
     (r"\.geom$", "ossim-geom"), (r"\.RPB$", "rpb"), (r"RPC-md_alos\.txt$|IMG-md_alos\.tif$", "alos"),
     (r"\.vrt$|rpc_unsupported\.xml$", "vrt"), (r"envirpc\.hdr$", "envi-header"), (r"\.json$", "json"),
-    (r"RPC_.*\.XML$|rpc_(PLEIADES|SPOT6)\.xml$", "dimap"), (r"\.(xml|XML)$", "digital-globe-xml"),
+    (r"RPC_.*\.XML$|IMG_md_\w+_R1C1\.jp2$|rpc_(PLEIADES|SPOT6)\.xml$", "dimap"), (r"\.(xml|XML)$", "digital-globe-xml"),
     (r"\.(txt|TXT|rpc)$", "text"),
-    (r"/(md_\w+\.tif|envirpc\.img|IMG_md_\w+\.jp2)$", "gdal-metadata"), (r"\.tif$", "tiff-tag"),
+    (r"/(md_\w+\.tif|envirpc\.img)$", "gdal-metadata"), (r"\.tif$", "tiff-tag"),
 ]
 
 
