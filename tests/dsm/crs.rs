@@ -1,9 +1,10 @@
-//! A surface model on maps in feet and in degrees is the one on a map in metres.
+//! A surface model on maps in feet and in degrees is the one on a map in metres, and so are its
+//! products.
 
 use std::path::Path;
 
 use crate::common::{json, simulated, skysweep};
-use io::raster::read_dem;
+use io::raster::{ImageSource, read_dem};
 
 /// The sample town in Florida, where maps are in US survey feet, with fewer samples per pixel.
 const IN_FLORIDA: [(&str, &str); 3] =
@@ -47,4 +48,35 @@ fn maps_in_feet_and_in_degrees_hold_the_same_surface() {
     let (x, y) = cell(degrees);
     assert!((x * 111_320.0 * 30.34_f64.to_radians().cos() - 1.0).abs() < 0.01, "{x}");
     assert!((y * 110_850.0 - 1.0).abs() < 0.01, "{y}");
+    let expected = ground_error_m(&scene, &folder.path().join("EPSG_32617"));
+    for crs in [feet, degrees] {
+        let run = folder.path().join(crs.replace(':', "_"));
+        let found = ground_error_m(&scene, &run);
+        assert!((found - expected).abs() < SAME_M, "{crs}: the ground is off by {found} m instead of {expected} m");
+        for product in ["contours.gpkg", "cloud.laz", "tileset.json"] {
+            assert!(run.join("products").join(product).is_file(), "{crs}: no {product}");
+        }
+        let report = std::fs::read_to_string(run.join("products/products.json")).unwrap();
+        let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+        let cell_m = report["mesh"]["glb_cell_m"].as_f64().expect("a number");
+        assert!((cell_m - 1.0).abs() < 0.01, "{crs}: cells of the mesh of {cell_m} m");
+        let ortho = run.join("ortho.tif");
+        let mut command = skysweep();
+        command.arg("ortho").arg(scene.join("view_1.tif")).arg("--dsm").arg(&run).arg("-o").arg(&ortho);
+        command.args(["--gsd", "2", "-q"]).assert().code(0);
+        let of_image = ImageSource::open(&ortho).unwrap().info().geotransform.expect("a place");
+        let (wide, high) = cell(crs);
+        let ratios = [of_image.0[1] / wide, -of_image.0[5] / high];
+        assert!(ratios.iter().all(|ratio| (ratio - 2.0).abs() < 0.01), "{crs}: {ratios:?} cells of the surface");
+    }
+}
+
+/// Makes all products of a run, and returns the mean absolute error of the ground, metres.
+fn ground_error_m(scene: &Path, run: &Path) -> f64 {
+    let mut command = skysweep();
+    command.arg("products").arg(run).arg("-q").assert().code(0);
+    let mut command = skysweep();
+    command.arg("eval").arg(run.join("products/dtm/dtm.tif")).arg(scene.join("truth/dtm.tif"));
+    let found = json(command.args(["--align", "none", "--json", "--no-report"]).output().unwrap());
+    found["metrics"]["mae"].as_f64().expect("a number")
 }

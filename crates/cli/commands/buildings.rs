@@ -22,7 +22,7 @@ pub(crate) struct Args {
     /// GeoTIFF to write: 0 to 1, in the pixels of the image, with its RPC or its map.
     #[arg(short, long, value_name = "OUT.tif")]
     output: PathBuf,
-    /// Surface model on a projected map, or the folder of a run of skysweep dsm, to lay the index
+    /// Surface model on a map, or the folder of a run of skysweep dsm, to lay the index
     /// on.
     #[arg(long, value_name = "DSM")]
     dsm: Option<PathBuf>,

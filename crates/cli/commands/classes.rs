@@ -14,7 +14,7 @@ use crate::{Global, Outcome};
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example: skysweep classes run --multispectral ms_1.tif ms_2.tif -o classes")]
 pub(crate) struct Args {
-    /// Surface model on a projected map, or the folder of a run of skysweep dsm.
+    /// Surface model on a map with square cells, or the folder of a run of skysweep dsm.
     surface: PathBuf,
     /// Folder for classes.tif, roughness.tif, ndvi.tif and classes.json.
     #[arg(short, long, value_name = "DIR")]

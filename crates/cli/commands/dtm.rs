@@ -11,7 +11,7 @@ use crate::{Global, Outcome};
 /// Arguments of `skysweep dtm`.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// Surface model on a projected map, or the folder of a run of skysweep dsm.
+    /// Surface model on a map with square cells, or the folder of a run of skysweep dsm.
     surface: PathBuf,
     /// Folder for dtm.tif, height_above_ground.tif, ground.tif and dtm.json.
     #[arg(short, long, value_name = "DIR")]

@@ -24,7 +24,7 @@ pub(crate) struct Args {
     /// The images: anything GDAL reads, with its RPC inside or beside it.
     #[arg(required = true, value_name = "IMAGE")]
     images: Vec<PathBuf>,
-    /// Surface model on a projected map, or the folder of a run of skysweep dsm.
+    /// Surface model on a map, or the folder of a run of skysweep dsm.
     #[arg(long, value_name = "DSM")]
     dsm: PathBuf,
     /// GeoTIFF to write.

@@ -6,7 +6,7 @@
 //! is `Send` and `Sync`. Each call takes one exclusive PROJ handle, so threads run in parallel when
 //! they pass slices.
 
-use geodesy::{GeodesyError, MapPoint};
+use geodesy::{GeodesyError, MapPoint, metres_per_degree};
 
 use crate::error::CrsError;
 use crate::proj_handle::{CrsKind, Direction, Pool, Recipe, metres_per_unit, named_kind};
@@ -69,6 +69,19 @@ impl MapProjection {
     /// Metres per unit of `x` and `y`; `None` for a geographic CRS, whose units are degrees.
     pub fn metres_per_unit(&self) -> Option<f64> {
         self.metres_per_unit
+    }
+
+    /// Returns the lengths of a unit of `x` and of a unit of `y` at the ordinate `y`, metres. On a
+    /// projected map they are the same everywhere. Degrees are measured on the ellipsoid at the
+    /// latitude `y`.
+    ///
+    /// ```
+    /// let (east, north) = crs::MapProjection::from_epsg(4326)?.metres_per_unit_at(60.0);
+    /// assert!((east - 55_800.0).abs() < 1.0 && (north - 111_412.0).abs() < 1.0);
+    /// # Ok::<(), crs::CrsError>(())
+    /// ```
+    pub fn metres_per_unit_at(&self, y: f64) -> (f64, f64) {
+        self.metres_per_unit.map_or_else(|| metres_per_degree(y), |metres| (metres, metres))
     }
 
     /// Returns the map position of a longitude and latitude in degrees.

@@ -41,7 +41,7 @@ pub enum EyelineError {
 
 impl Eyeline {
     /// Computes the directions over a grid of (columns, rows) `size` at `height_m` above the
-    /// ellipsoid. The unit of the map is the metre.
+    /// ellipsoid.
     ///
     /// # Errors
     /// [`EyelineError`] if the camera does not see the grid or the projection does not hold it.
@@ -66,8 +66,9 @@ impl Eyeline {
                 nodes[(i, j)] = [(c - column) / RISE_M, (r - row) / RISE_M];
             }
         }
-        let (along_columns, along_rows) = geotransform.cell_size();
-        Ok(Self { step, nodes, cell_m: [along_columns, along_rows] })
+        let (_, middle) = geotransform.map_from_cell(0.5 * size.0 as f64, 0.5 * size.1 as f64);
+        let (along_columns_m, along_rows_m) = geotransform.cell_size_m(projection.metres_per_unit_at(middle));
+        Ok(Self { step, nodes, cell_m: [along_columns_m, along_rows_m] })
     }
 
     /// Returns the motion of the line of sight towards the sensor, columns and rows per metre of

@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use crs::{Crs, CrsIdentity, HeightConverter, MapProjection, VerticalDatum, compound_wkt, horizontal_wkt};
 use eval::{MetresFromCells, bilinear, nearest};
-use geodesy::metres_per_degree;
 use io::raster::{Band, BandData, CogCrs, CogRaster, ImageSource, undeclared_no_data, write_cog};
 use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray1};
 use pyo3::prelude::*;
@@ -110,7 +109,7 @@ pub(crate) fn convert_heights<'py>(
         let place = GeoTransform(geotransform);
         let projection = MapProjection::from_definition(definition)?;
         let middle = place.map_from_cell(grid.width() as f64 / 2.0, grid.height() as f64 / 2.0);
-        let metres = projection.metres_per_unit().map_or_else(|| metres_per_degree(middle.1), |m| (m, m));
+        let metres = projection.metres_per_unit_at(middle.1);
         let (along_columns, along_rows) = MetresFromCells::new(&place, metres).cell_size_m();
         let (from, to) = (HeightConverter::new(datums.0.parse()?)?, HeightConverter::new(datums.1.parse()?)?);
         eval::convert_heights(&mut grid, &place, along_columns.max(along_rows), &projection, &from, &to)?;

@@ -52,4 +52,16 @@ impl GeoTransform {
         let c = &self.0;
         (c[1].hypot(c[4]), c[2].hypot(c[5]))
     }
+
+    /// Returns the side lengths of a cell along columns and rows, metres, on a map whose units are
+    /// `metres_per_unit` metres long along x and y.
+    ///
+    /// ```
+    /// let feet = raster::GeoTransform::north_up(0.0, 0.0, 10.0).cell_size_m((0.3048, 0.3048));
+    /// assert!((feet.0 - 3.048).abs() < 1e-12 && (feet.1 - 3.048).abs() < 1e-12);
+    /// ```
+    pub fn cell_size_m(&self, metres_per_unit: (f64, f64)) -> (f64, f64) {
+        let (c, (x_m, y_m)) = (&self.0, metres_per_unit);
+        ((c[1] * x_m).hypot(c[4] * y_m), (c[2] * x_m).hypot(c[5] * y_m))
+    }
 }

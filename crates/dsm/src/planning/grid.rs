@@ -289,12 +289,13 @@ fn covered_bounds(geometry: &ViewGeometry, projection: &MapProjection) -> Result
 /// Returns the width and height of a cell of `gsd_m` in units of the CRS. A cell in degrees is
 /// square on the ground at this latitude and has whole 1e-8 degrees, about a millimetre.
 fn cell_of(projection: &MapProjection, gsd_m: f64, lat_deg: f64) -> (f64, f64) {
-    if let Some(metres) = projection.metres_per_unit() {
-        return (gsd_m / metres, gsd_m / metres);
+    let (across_m, along_m) = projection.metres_per_unit_at(lat_deg);
+    let cell = (gsd_m / across_m, gsd_m / along_m);
+    if projection.metres_per_unit().is_some() {
+        return cell;
     }
     let whole = |degrees: f64| (degrees * 1e8).round().max(1.0) / 1e8;
-    let (across, along) = metres_per_degree(lat_deg);
-    (whole(gsd_m / across), whole(gsd_m / along))
+    (whole(cell.0), whole(cell.1))
 }
 
 /// Returns a north-up grid on whole multiples of the cell's width and height that holds the bounds:

@@ -10,7 +10,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use camera::{ImageCorrection, RpcCamera};
 use crs::MapProjection;
-use geodesy::{LonLatHeight, metres_per_degree};
+use geodesy::LonLatHeight;
 use io::raster::iso_time;
 use raster::Window;
 
@@ -273,10 +273,9 @@ impl DsmGrid {
         let corners = [(bounds.x_min, bounds.y_min), (bounds.x_max, bounds.y_max)];
         let [low, high] = corners.map(|(x, y)| projection.lonlat_from_map(x, y));
         let (low, high) = (low.map_err(|e| e.to_string())?, high.map_err(|e| e.to_string())?);
-        let (tolerance, (across_m, along_m)) = match projection.metres_per_unit() {
-            Some(metres) => (CELL_TOLERANCE, (metres, metres)),
-            None => (CELL_TOLERANCE_DEGREES, metres_per_degree(0.5 * (low.1 + high.1))),
-        };
+        let is_in_degrees = projection.metres_per_unit().is_none();
+        let tolerance = if is_in_degrees { CELL_TOLERANCE_DEGREES } else { CELL_TOLERANCE };
+        let (across_m, along_m) = projection.metres_per_unit_at(0.5 * (low.1 + high.1));
         for (side, metres) in [(width, across_m), (-height, along_m)] {
             let share = side * metres / self.gsd_m;
             ensure((share - 1.0).abs() <= tolerance, || {

@@ -52,16 +52,6 @@ pub enum ProductsError {
         /// The surface model.
         path: PathBuf,
     },
-    /// The surface model is in degrees.
-    #[error(
-        "the surface model is on a map in degrees, expected a projected map for all products but the point cloud; make \
-         the cloud alone, or warp the surface model first: {}",
-        path.display()
-    )]
-    InDegrees {
-        /// The surface model.
-        path: PathBuf,
-    },
     /// The surface has no triangle.
     #[error("no four neighbouring cells have heights, expected a surface for the mesh: {}", path.display())]
     NoTriangles {

@@ -119,16 +119,18 @@ fn write_single(
         let numbered: Vec<u32> = vertices.iter().map(number).collect();
         all.triangles.extend(triangles.iter().map(|corners| corners.map(|corner| numbered[corner as usize])));
     }
-    let metres = surface.projection.metres_per_unit().unwrap_or(1.0);
     let geotransform = level.geotransform(&surface.dem.geotransform);
     let (x, y) = geotransform.map_from_cell(0.5 * width as f64, 0.5 * height as f64);
+    let metres = surface.projection.metres_per_unit_at(y);
     let known = level.heights.data().iter().filter(|h| h.is_finite());
     let low = known.fold(f32::INFINITY, |low, h| low.min(*h));
-    let origin = [x.round(), y.round(), f64::from(low).floor()];
+    // Whole metres or feet are easy to read; a degree is longer than most scenes.
+    let (x, y) = if surface.projection.metres_per_unit().is_some() { (x.round(), y.round()) } else { (x, y) };
+    let origin = [x, y, f64::from(low).floor()];
     let position = |&(column, row): &(u32, u32)| {
         let (x, y) = geotransform.map_from_cell(f64::from(column), f64::from(row));
         let up = f64::from(level.heights[(column as usize, row as usize)]) - origin[2];
-        [((x - origin[0]) * metres) as f32, up as f32, (-(y - origin[1]) * metres) as f32]
+        [((x - origin[0]) * metres.0) as f32, up as f32, (-(y - origin[1]) * metres.1) as f32]
     };
     let positions: Vec<[f32; 3]> = all.vertices.iter().map(position).collect();
     let place =
@@ -147,14 +149,15 @@ fn write_single(
     Ok((all.triangles.len(), origin))
 }
 
-/// What the file says about its place: map = origin + (x, −z) / metres_per_unit, height = origin +
-/// y.
-fn extras(surface: &SurfaceOfRun, origin: [f64; 3], metres: f64) -> serde_json::Value {
+/// What the file says about its place: map = origin + (x, −z) / metres_per_map_unit, height =
+/// origin + y. On a map in degrees the metres are two, those per degree east and north.
+fn extras(surface: &SurfaceOfRun, origin: [f64; 3], metres: (f64, f64)) -> serde_json::Value {
+    let per_unit = if surface.projection.metres_per_unit().is_some() { json!(metres.0) } else { json!(metres) };
     json!({
         "crs": surface.crs.to_string(),
         "vertical_datum": surface.crs.vertical.to_string(),
         "origin": origin,
-        "metres_per_map_unit": metres,
+        "metres_per_map_unit": per_unit,
         "axes": "x east, y up, z south",
     })
 }

@@ -61,10 +61,6 @@ pub fn run(config: &ProductsConfig, progress: &dyn Progress) -> Result<ProductsR
 
 fn make(config: &ProductsConfig, output: &Path, progress: &dyn Progress) -> Result<ProductsReport, ProductsError> {
     let surface = SurfaceOfRun::open(&config.run, progress)?;
-    let only_points = config.products.iter().all(|product| *product == ProductKind::Cloud);
-    if !only_points && surface.projection.metres_per_unit().is_none() {
-        return Err(ProductsError::InDegrees { path: surface.dem.path });
-    }
     if config.output.is_none() {
         guarded::check_folder(output)?;
     }

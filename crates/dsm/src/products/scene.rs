@@ -72,10 +72,10 @@ impl SurfaceOfRun {
         Ok(source.read_samples(1, source.window())?)
     }
 
-    /// Side of a cell on a projected map, metres.
+    /// Side of a cell, metres.
     pub(super) fn cell_m(&self) -> f64 {
-        let (width, height) = self.dem.geotransform.cell_size();
-        (width * height).sqrt() * self.projection.metres_per_unit().unwrap_or(1.0)
+        let (width_m, height_m) = self.dem.cell_size_m(&self.projection);
+        (width_m * height_m).sqrt()
     }
 
     /// Columns and rows.

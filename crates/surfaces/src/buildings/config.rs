@@ -19,7 +19,7 @@ pub struct BuildingMapConfig {
     pub image: PathBuf,
     /// GeoTIFF to write; the report is written beside it.
     pub output: PathBuf,
-    /// Surface model on a projected map, or the folder of a DSM run, on which the index is laid.
+    /// Surface model on a map, or the folder of a DSM run, on which the index is laid.
     /// `None` leaves it in the pixels of the image.
     #[serde(default)]
     pub surface: Option<PathBuf>,

@@ -16,7 +16,7 @@ use job::error::SettingError;
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct ClassesConfig {
-    /// Surface model on a projected map, or the folder of a DSM run.
+    /// Surface model on a map with square cells, or the folder of a DSM run.
     pub surface: PathBuf,
     /// Folder for the rasters and the report.
     pub output: PathBuf,

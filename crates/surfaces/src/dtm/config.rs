@@ -11,7 +11,7 @@ use terrain::GroundConfig;
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct DtmConfig {
-    /// Surface model on a projected map, or the folder of a DSM run.
+    /// Surface model on a map with square cells, or the folder of a DSM run.
     pub surface: PathBuf,
     /// Folder for the rasters and the report.
     pub output: PathBuf,

@@ -24,12 +24,6 @@ pub enum DtmError {
         /// The surface model.
         path: PathBuf,
     },
-    /// The surface model is in degrees.
-    #[error("the surface model is on a map in degrees, expected a projected map; warp it first: {}", path.display())]
-    InDegrees {
-        /// The surface model.
-        path: PathBuf,
-    },
     /// The cells of the surface model are not square.
     #[error("the cells measure {width_m} m by {height_m} m, expected square cells: warp it first: {}", path.display())]
     NotSquare {

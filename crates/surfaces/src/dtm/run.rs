@@ -91,9 +91,7 @@ pub(crate) fn read_surface(config: &DtmConfig, progress: &dyn Progress) -> Resul
     let surface = read_dem(&path)?;
     let horizontal = surface.horizontal_epsg.ok_or_else(|| DtmError::NoEpsg { path: path.clone() })?;
     let projection = MapProjection::from_epsg(horizontal)?;
-    let metres = projection.metres_per_unit().ok_or_else(|| DtmError::InDegrees { path: path.clone() })?;
-    let (width, height) = surface.geotransform.cell_size();
-    let (width_m, height_m) = (width * metres, height * metres);
+    let (width_m, height_m) = surface.cell_size_m(&projection);
     if (width_m - height_m).abs() > SQUARE_TOLERANCE * width_m.max(height_m) {
         return Err(DtmError::NotSquare { path, width_m, height_m });
     }

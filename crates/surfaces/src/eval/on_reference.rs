@@ -4,7 +4,6 @@ use std::path::Path;
 
 use crs::{CrsIdentity, MapProjection};
 use eval::{CellMap, bilinear, nearest};
-use geodesy::metres_per_degree;
 use io::raster::{Dem, ImageSource};
 use raster::{GeoTransform, Grid};
 
@@ -36,10 +35,7 @@ pub(super) fn metres_per_unit_at(
     path: &Path,
 ) -> Result<(f64, f64), EvalJobError> {
     let Some(definition) = definition else { return Ok((1.0, 1.0)) };
-    if let Some(metres) = FileCrsError::projection(path, definition)?.metres_per_unit() {
-        return Ok((metres, metres));
-    }
-    Ok(metres_per_degree(lat_deg))
+    Ok(FileCrsError::projection(path, definition)?.metres_per_unit_at(lat_deg))
 }
 
 /// Returns the map from the cells of the reference to the cells of another grid.

@@ -22,7 +22,7 @@ const IMAGES_MAX: usize = 255;
 pub struct OrthoConfig {
     /// Images with RPCs, at most 255.
     pub images: Vec<PathBuf>,
-    /// Surface model on a projected map, or the folder of a DSM run.
+    /// Surface model on a map, or the folder of a DSM run.
     pub surface: PathBuf,
     /// GeoTIFF to write; the mask is written beside it.
     pub output: PathBuf,

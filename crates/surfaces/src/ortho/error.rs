@@ -25,12 +25,6 @@ pub enum OrthoError {
         /// The surface model.
         path: PathBuf,
     },
-    /// The surface model is in degrees.
-    #[error("the surface model is in degrees, expected a projected map: {}", path.display())]
-    InDegrees {
-        /// The surface model.
-        path: PathBuf,
-    },
     /// The surface model is empty.
     #[error("the surface model has no heights: {}", path.display())]
     NoHeights {
@@ -59,7 +53,7 @@ pub enum OrthoError {
         expected: usize,
     },
     /// The area has no cells or too many.
-    #[error("from {low} to {high} there are {cells} cells of {cell_m} m, expected 1 to 2^28")]
+    #[error("from {low} to {high} there are {cells} cells of {cell} units of the map, expected 1 to 2^28")]
     Extent {
         /// Lower bound on the map.
         low: f64,
@@ -67,8 +61,8 @@ pub enum OrthoError {
         high: f64,
         /// Number of cells.
         cells: f64,
-        /// Cell size, metres.
-        cell_m: f64,
+        /// Side of a cell, units of the map.
+        cell: f64,
     },
     /// The ortho does not fit in memory.
     #[error("{width} x {height} cells of {bands} bands, at most 2^28 in all: choose a smaller area or larger cells")]

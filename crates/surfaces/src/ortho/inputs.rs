@@ -110,12 +110,10 @@ impl OrthoSurface {
 
     /// Takes a surface model in memory, as [`OrthoSurface::read`] takes a file.
     pub(crate) fn of(mut dsm: Dem, stated: Option<VerticalDatum>, progress: &dyn Progress) -> Result<Self, OrthoError> {
-        let path = || dsm.path.clone();
-        let map = MapCrs::of(&dsm).ok_or_else(|| OrthoError::NoCrs { path: path() })?;
+        let map = MapCrs::of(&dsm).ok_or_else(|| OrthoError::NoCrs { path: dsm.path.clone() })?;
         let projection = map.projection()?;
-        let metres = projection.metres_per_unit().ok_or_else(|| OrthoError::InDegrees { path: path() })?;
-        let (along_columns, along_rows) = dsm.geotransform.cell_size();
-        let cell_m = metres * (along_columns * along_rows).sqrt();
+        let (along_columns_m, along_rows_m) = dsm.cell_size_m(&projection);
+        let cell_m = (along_columns_m * along_rows_m).sqrt();
         to_ellipsoid(&mut dsm, stated, &projection, cell_m, progress)?;
         let known: Vec<f64> = dsm.heights.data().iter().filter(|h| h.is_finite()).map(|&h| f64::from(h)).collect();
         if known.is_empty() {
@@ -231,23 +229,25 @@ impl OrthoGrid {
             return Self::of_surface(dsm, projection);
         }
         let (width, height) = (dsm.heights.width(), dsm.heights.height());
-        let cell = config.cell_m.unwrap_or_else(|| dsm.geotransform.cell_size().0);
-        if !(cell > 0.0 && cell.is_finite()) {
-            return Err(SettingError::new("the cell size", cell, "a positive number of metres").into());
-        }
         let [x_min, y_min, x_max, y_max] = config.bounds.unwrap_or_else(|| extent(&dsm.geotransform, width, height));
-        let count = |low: f64, high: f64| {
+        let (metres_x, metres_y) = projection.metres_per_unit_at(0.5 * (y_min + y_max));
+        let (cell_x, cell_y) =
+            config.cell_m.map_or_else(|| dsm.geotransform.cell_size(), |metres| (metres / metres_x, metres / metres_y));
+        if ![cell_x, cell_y].iter().all(|cell| *cell > 0.0 && cell.is_finite()) {
+            return Err(SettingError::new("the cell size", cell_x, "a positive number of metres").into());
+        }
+        let count = |low: f64, high: f64, cell: f64| {
             let cells = ((high - low) / cell - 1e-6).ceil();
             if cells >= 1.0 && cells <= CELLS_MAX as f64 {
                 return Ok(cells as usize);
             }
-            Err(OrthoError::Extent { low, high, cells, cell_m: cell })
+            Err(OrthoError::Extent { low, high, cells, cell })
         };
-        let (columns, rows) = (count(x_min, x_max)?, count(y_min, y_max)?);
+        let (columns, rows) = (count(x_min, x_max, cell_x)?, count(y_min, y_max, cell_y)?);
         if columns.saturating_mul(rows) > CELLS_MAX {
             return Err(OrthoError::TooLarge { width: columns, height: rows, bands: 1 });
         }
-        let geotransform = GeoTransform::north_up(x_min, y_max, cell);
+        let geotransform = GeoTransform([x_min, cell_x, 0.0, y_max, 0.0, -cell_y]);
         let ground = GridGround::new(projection, &geotransform, (columns, rows))?;
         Ok(Self { geotransform, width: columns, height: rows, ground, is_dsm: false })
     }

@@ -8,7 +8,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crs::{CrsIdentity, VerticalDatum};
+use crs::{CrsIdentity, MapProjection, VerticalDatum};
 use gdal::Dataset;
 use raster::{GeoTransform, Grid, Window};
 
@@ -42,6 +42,16 @@ pub struct Dem {
     pub no_data: Option<f64>,
     /// Images that it was made of, if the file names them.
     pub provenance: Provenance,
+}
+
+impl Dem {
+    /// Returns the side lengths of a cell along columns and rows, metres, in the middle of the grid.
+    /// `projection` is that of the grid.
+    pub fn cell_size_m(&self, projection: &MapProjection) -> (f64, f64) {
+        let (column, row) = (0.5 * self.heights.width() as f64, 0.5 * self.heights.height() as f64);
+        let (_, middle) = self.geotransform.map_from_cell(column, row);
+        self.geotransform.cell_size_m(projection.metres_per_unit_at(middle))
+    }
 }
 
 /// Reads the first band of a raster as heights.
