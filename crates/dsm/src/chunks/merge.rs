@@ -205,18 +205,34 @@ pub fn merge(
     merger.finish(&[])
 }
 
-/// Warns when hardly any cell has an observed height.
+/// Warns when hardly any cell has an observed height, and when fewer have one than are filled.
 fn warn_of_share(plan: &Plan, counts: &SurfaceCounts, notes: &mut Notes<'_>) {
     let (columns, rows) = plan.grid.size;
-    let share = counts.observed as f64 / (columns * rows).saturating_sub(counts.masked).max(1) as f64;
-    if share < OBSERVED_WEAK {
-        notes.warn(format!(
+    if let Some(doubt) = doubt_of_share((columns * rows).saturating_sub(counts.masked), counts) {
+        notes.warn(format!("{doubt}: {}", image_names(plan)));
+    }
+}
+
+/// Returns what the share of observed heights among `cells` says against a surface.
+fn doubt_of_share(cells: usize, counts: &SurfaceCounts) -> Option<String> {
+    let share = |part: usize| part as f64 / cells.max(1) as f64;
+    let observed = share(counts.observed);
+    if observed < OBSERVED_WEAK {
+        return Some(format!(
             "only {:.1} % of the cells have an observed height: the images may not show the same ground, or its heights \
-             lie outside those that were searched: {}",
-            100.0 * share,
-            image_names(plan)
+             lie outside those that were searched",
+            100.0 * observed
         ));
     }
+    (counts.filled > counts.observed).then(|| {
+        format!(
+            "{:.0} % of the cells are filled from their surroundings, and only {:.0} % are observed; between high \
+             houses, in shadows and after months images agree on little, and more images, or images of one pass, show \
+             more; source.tif tells which cells were filled",
+            100.0 * share(counts.filled),
+            100.0 * observed
+        )
+    })
 }
 
 /// Returns the files of the images in the order in which they were given.
@@ -253,5 +269,22 @@ fn surface_report(plan: &Plan, counts: &SurfaceCounts) -> SurfaceReport {
         speckle_removed: counts.speckle_removed,
         kept_by_view: kept_by_image.iter().copied().flatten().collect(),
         kept_by_image,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_surface_that_is_filled_rather_than_observed_is_doubted() {
+        let doubt = |observed, filled, void| {
+            let counts = SurfaceCounts { observed, filled, void, ..SurfaceCounts::default() };
+            doubt_of_share(observed + filled + void, &counts)
+        };
+        assert_eq!(doubt(60, 40, 0), None);
+        assert_eq!(doubt(40, 30, 30), None);
+        assert!(doubt(40, 46, 14).unwrap().starts_with("46 % of the cells are filled"));
+        assert!(doubt(20, 70, 10).unwrap().starts_with("only 20.0 % of the cells have an observed height"));
     }
 }
