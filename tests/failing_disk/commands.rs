@@ -37,16 +37,22 @@ pub(crate) const COMMANDS: &[Writing] = &[
     Writing {
         name: "eval of a run",
         before: &[DSM],
-        command: "eval out/dsm/dsm.tif $town/truth/dsm.tif",
+        command: "eval out/dsm/dsm.tif $town/truth/dsm.tif --align none",
         overwrite: "--overwrite",
     },
-    writing("eval", "eval $made/run/dsm/dsm.tif $town/truth/dsm.tif -o out --error-map error.tif --html page.html"),
-    writing("eval of surfaces", "eval $town/truth/buildings.city.json $town/truth/buildings.city.json -o out"),
+    writing(
+        "eval",
+        "eval $made/run/dsm/dsm.tif $town/truth/dsm.tif -o out --align none --error-map error.tif --html page.html",
+    ),
+    writing(
+        "eval of surfaces",
+        "eval $town/truth/buildings.city.json $town/truth/buildings.city.json --samples-per-m2 1 -o out",
+    ),
     writing("simulate", "simulate $made/tiny.toml -o out --flight 2"),
     writing("ortho", "ortho $town/view_1.tif --dsm $town/truth/dsm.tif -o ortho.tif"),
     writing("dtm", "dtm $town/truth/dsm.tif -o out"),
     writing("classes", "classes $town/truth/dsm.tif -o out"),
-    writing("diff", "diff $town/truth/dsm.tif $town/truth/dtm.tif -o out --sigma-m 0.1"),
+    writing("diff", "diff $town/truth/dsm.tif $town/truth/dtm.tif -o out --align none --sigma-m 0.1"),
     writing("buildings", "buildings $town/view_1.tif -o buildings.tif"),
     writing("heightmap", "heightmap $samples/truth/dsm.tif --center 5.4 43.53 --size 60 -o map.tif"),
     writing("heightmaps", "heightmap $samples/truth/dsm.tif --positions $made/list.csv --size 60 -o out"),
@@ -76,7 +82,7 @@ pub(crate) const COMMANDS: &[Writing] = &[
     writing("split", "split $tests/reference/align/model -o split.json"),
     writing(
         "register",
-        "register $town/view_3.tif --dsm $town/truth/dsm.tif --images $town/view_1.tif -o register.json",
+        "register $town/view_3.tif --dsm $town/truth/dsm.tif --images $town/view_1.tif --reach 5 --order shift -o register.json",
     ),
     writing("rpc convert", "rpc convert $town/view_1.tif -o view.json"),
 ];
@@ -156,7 +162,7 @@ fn made() -> &'static Made {
         let write = |name: &str, text: &str| std::fs::write(folder.join(name), text).unwrap();
         write("list.csv", "id,lon,lat,heading,height_m\na,5.4000,43.5300,37,\nb,5.4003,43.5301,100,195\n");
         let scene = std::fs::read_to_string(sample("scene.toml")).unwrap();
-        write("tiny.toml", &scene.replace("size_m = 320.0", "size_m = 60.0"));
+        write("tiny.toml", &scene.replace("size_m = 320.0", "size_m = 60.0").replace("subpixels = 3", "subpixels = 1"));
         let skysweep = |words: &[&str]| {
             let mut command = crate::common::skysweep();
             command.current_dir(&folder).args(words).args(["-q", "--progress", "none"]).assert().code(0);
