@@ -332,7 +332,6 @@ fn gradients_hold_for_a_thin_surfel_that_is_almost_seen_from_the_edge() {
 
 #[test]
 fn a_splat_covers_its_area_however_fine_the_pixels_are() {
-    let (camera, _) = pinhole();
     // Facing the camera, and turned by 60 degrees.
     for (rotation, facing) in [([1.0, 0.0, 0.0, 0.0], 1.0), ([0.75f32.sqrt(), 0.5, 0.0, 0.0], 0.5)] {
         for finer in [1.0, 2.0, 4.0] {
@@ -342,7 +341,6 @@ fn a_splat_covers_its_area_however_fine_the_pixels_are() {
                 focal_px: [20.0 * finer; 2],
                 principal_px: [10.0 * finer - 0.5; 2],
                 size: [20 * finer as usize; 2],
-                ..camera
             };
             // The mean over places within a pixel.
             let covered = |place: u8| {
