@@ -215,6 +215,38 @@ fn masked_pixels_take_no_part() {
     refused("the mask of flight_03.png is 0 everywhere");
 }
 
+/// Cameras of a transforms.json begin with random points.
+#[test]
+fn transforms_are_trained_on() {
+    let out = tempfile::tempdir().unwrap();
+    let root = out.path().join("scene");
+    let model = io::colmap::read(&dataset().join("sparse/0")).unwrap();
+    std::fs::create_dir_all(root.join("images")).unwrap();
+    let frame = |view: &io::colmap::ColmapView| {
+        std::fs::copy(dataset().join("images").join(&view.name), root.join("images").join(&view.name)).unwrap();
+        let (lens, r, c) = (&model.lenses[view.lens], view.pose.rotation, view.pose.centre);
+        let ([fx, fy], at) = (lens.focal_px(), lens.principal_point());
+        // The columns of OpenGL point to the right, up and back.
+        let mut matrix: Vec<Vec<f64>> = (0..3).map(|i| vec![r[0][i], -r[1][i], -r[2][i], c[i]]).collect();
+        matrix.push(vec![0.0, 0.0, 0.0, 1.0]);
+        serde_json::json!({
+            "file_path": format!("./images/{}", view.name.trim_end_matches(".png")), "transform_matrix": matrix,
+            "w": lens.width(), "h": lens.height(), "fl_x": fx, "fl_y": fy, "cx": at.sample + 0.5, "cy": at.line + 0.5,
+        })
+    };
+    let frames: Vec<_> = model.views.iter().map(frame).collect();
+    std::fs::write(root.join("transforms.json"), serde_json::json!({ "frames": frames }).to_string()).unwrap();
+    let output = out.path().join("a");
+    let mut command = skysweep();
+    command.arg("train").arg(&root).arg("-o").arg(&output).args(["--shrink", "4", "--iterations", "60"]);
+    command.assert().success().stderr(predicate::str::contains("the training begins with"));
+    let report = report_of(&output);
+    assert_eq!((held_out(&report).len(), report["preset"].as_str()), (2, Some("photographs")));
+    let trained: Vec<_> = report["views"].as_array().unwrap().iter().filter(|v| v["held_out"] == false).collect();
+    let mean = |key: &str| trained.iter().map(|v| v[key].as_f64().unwrap()).sum::<f64>() / trained.len() as f64;
+    assert!(mean("psnr_db") > mean("psnr_before_db") + 1.0, "{report}");
+}
+
 /// A dataset in the layout of many reconstructions: the model in a folder of its own, the images in
 /// folders by camera beside it.
 #[test]
