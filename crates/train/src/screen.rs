@@ -7,13 +7,13 @@
 //! p₁).
 //! The depth there is z₀ r. For an affine camera r = 1, and the depth is z₀ + γ_u u + γ_v v.
 //!
-//! A pixel shows the mean over its area. So the Gaussian is blurred in its own plane by the pixel as
-//! the plane sees it: its covariance 1 becomes 1 + s A Aᵀ with the variance s of a pixel, and its
-//! opacity falls by the factor that its area grows by (the 2D filter of Yu et al., "Mip-Splatting",
-//! CVPR 2024, in the plane of the splat as Younes and Boukhayma, "Anti-Aliased 2D Gaussian
-//! Splatting", 2025). With J Jᵀ + s = L Lᵀ, that is the splat whose derivatives of the pixel are L
-//! instead of J = [j_u j_v], in the same plane: its ζ are Lᵀ Aᵀ ζ. From then on there is no
-//! difference between splats, however fine they are.
+//! A pixel shows the mean over its area. So the Gaussian is blurred in its own plane by the pixel
+//! as the plane sees it: its covariance 1 becomes 1 + s A Aᵀ with the variance s of a pixel, and
+//! its opacity falls by the factor that its area grows by (the 2D filter of Yu et al., "Mip-
+//! Splatting", CVPR 2024, in the plane of the splat as Younes and Boukhayma, "Anti-Aliased 2D
+//! Gaussian Splatting", 2025). With J Jᵀ + s = L Lᵀ, that is the splat whose derivatives of the
+//! pixel are L instead of J = [j_u j_v], in the same plane: its ζ are Lᵀ Aᵀ ζ. From then on there
+//! is no difference between splats, however fine they are.
 
 use crate::surfel::Surfel;
 use crate::view::LocalView;
