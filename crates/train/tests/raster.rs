@@ -342,10 +342,10 @@ fn a_splat_covers_its_area_however_fine_the_pixels_are() {
                 principal_px: [10.0 * finer - 0.5; 2],
                 size: [20 * finer as usize; 2],
             };
-            // The mean over places within a pixel.
+            // The mean over places within a pixel, about the axis of the camera.
             let covered = |place: u8| {
                 let surfel = Surfel {
-                    position: [0.0625 * f32::from(place % 4), 0.0625 * f32::from(place / 4), 5.0],
+                    position: [0.0625 * (f32::from(place % 4) - 1.5), 0.0625 * (f32::from(place / 4) - 1.5), 5.0],
                     rotation,
                     log_scale: [0.05f32.ln(); 2],
                     opacity_logit: 0.0,
