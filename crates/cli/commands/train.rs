@@ -29,6 +29,10 @@ pub(crate) struct Args {
     /// folder in or beside it that has them].
     #[arg(long, value_name = "FOLDER")]
     pictures: Option<PathBuf>,
+    /// Folder of a mask for each image, NAME.jpg.png or NAME.png: pixels that are 0 there, such as
+    /// the sky, count neither in the training nor in the judgement [default: all pixels count].
+    #[arg(long, value_name = "FOLDER")]
+    masks: Option<PathBuf>,
     /// Another COLMAP model of the same cameras, whose points are added, such as the reconstruction
     /// that the cameras come from: what is not in the city model begins there.
     #[arg(long, value_name = "FOLDER")]
@@ -172,6 +176,7 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
     let mut config = TrainConfig::new(args.inputs[0].clone(), args.output.clone());
     config.more_points.clone_from(&args.points);
     config.images.clone_from(&args.pictures);
+    config.masks.clone_from(&args.masks);
     config.iterations = args.iterations;
     config.budget = args.budget;
     config.shrink = args.shrink;
@@ -195,8 +200,12 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
 
 /// Trains on satellite images.
 fn on_images(args: &Args, splats: &Path, global: Global) -> anyhow::Result<Outcome> {
-    let given =
-        [("--pictures", args.pictures.is_some()), ("--points", args.points.is_some()), ("--shrink", args.shrink != 1)];
+    let given = [
+        ("--pictures", args.pictures.is_some()),
+        ("--masks", args.masks.is_some()),
+        ("--points", args.points.is_some()),
+        ("--shrink", args.shrink != 1),
+    ];
     if let Some((option, _)) = given.iter().find(|(_, given)| *given) {
         bail!("{option} is for datasets, and --splats for satellite images: leave one of them out");
     }

@@ -8,7 +8,7 @@
 use crate::footprint::{BLOCKS, Brush, Footprint, GREATEST_ALPHA};
 use crate::forward::{AHEAD, TileTask};
 use crate::screen::{ScreenGradient, ScreenSplat};
-use crate::simd::{Block, InstructionSet, Lanes, total};
+use crate::simd::{Block, InstructionSet, Lanes};
 
 /// Gradients by the sums of a block, and what the pass keeps for each pixel.
 #[derive(Debug, Clone, Copy)]
@@ -66,10 +66,9 @@ pub(crate) fn spread<I: InstructionSet, const PERSPECTIVE: bool, const INVERSE: 
         drawn = before;
         let splat = &task.splats[entry as usize];
         let brush = Brush::new(isa, splat, task.origin, task.reference_depth);
-        // The gradient by the centre of the least footprint.
-        let (mut sums, mut centre) = ([0.0; 16], [Block::ZERO; 2]);
+        let mut sums = [0.0; 16];
         for part in 0..I::PARTS {
-            let (mut total, mut by_centre) = ([isa.splat(0.0); 16], [isa.splat(0.0); 2]);
+            let mut total = [isa.splat(0.0); 16];
             let mut left = u32::from(mask);
             for &bits in own {
                 let block = left.trailing_zeros() as usize % BLOCKS;
@@ -79,44 +78,28 @@ pub(crate) fn spread<I: InstructionSet, const PERSPECTIVE: bool, const INVERSE: 
                     continue;
                 }
                 let (pixels, total) = (&mut pixels[block], &mut total);
-                if splat.is_fine {
-                    let at = brush.at::<I, PERSPECTIVE, true>(isa, block, part);
-                    let strength =
-                        spread_block::<I, PERSPECTIVE, INVERSE>(isa, &brush, splat, &at, drawn, part, pixels, total);
-                    if let Some((offset, least)) = at.least(drawn) {
-                        // ρ = 2 |offset|², and the offset falls as the centre moves.
-                        let pull = strength.add(strength).only(least);
-                        let ([dx, dy], [by_x, by_y]) = (offset, by_centre);
-                        by_centre = [dx.mul_add(pull, by_x), dy.mul_add(pull, by_y)];
-                    }
-                } else {
-                    let at = brush.at::<I, PERSPECTIVE, false>(isa, block, part);
-                    spread_block::<I, PERSPECTIVE, INVERSE>(isa, &brush, splat, &at, drawn, part, pixels, total);
-                }
+                // Where the splat is drawn, it lies before the horizon.
+                let at = brush.at::<I, PERSPECTIVE, false>(isa, block, part);
+                spread_block::<I, PERSPECTIVE, INVERSE>(isa, &brush, splat, &at, drawn, part, pixels, total);
             }
             sums = isa.totals(total, part, &mut kept);
-            if splat.is_fine {
-                by_centre[0].store(&mut centre[0], part);
-                by_centre[1].store(&mut centre[1], part);
-            }
         }
-        let centre = if splat.is_fine { [total(&centre[0]), total(&centre[1])] } else { [0.0; 2] };
-        *out = gathered(splat, sums, centre);
+        *out = gathered(splat, sums);
     }
 }
 
 /// Returns the gradient of an entry from its sums.
 #[inline(always)]
-fn gathered(splat: &ScreenSplat, mut sums: [f32; 16], centre: [f32; 2]) -> ScreenGradient {
+fn gathered(splat: &ScreenSplat, mut sums: [f32; 16]) -> ScreenGradient {
     let [a0, b0, a1, b1] = splat.inverse;
     // ∂L/∂p; the offset from the centre falls as the centre moves.
     let by_p = [0, 1].map(|k| splat.slopes[k].mul_add(sums[7], -sums[5 + k]));
-    sums[5] = a1.mul_add(-by_p[1], a0.mul_add(-by_p[0], centre[0]));
-    sums[6] = b1.mul_add(-by_p[1], b0.mul_add(-by_p[0], centre[1]));
+    sums[5] = a1.mul_add(-by_p[1], a0 * -by_p[0]);
+    sums[6] = b1.mul_add(-by_p[1], b0 * -by_p[0]);
     sums
 }
 
-/// Adds the gradient of a splat at a part of a block. Returns α ∂L/∂α.
+/// Adds the gradient of a splat at a part of a block.
 #[inline(always)]
 #[expect(clippy::too_many_arguments, reason = "registers are passed one by one")]
 fn spread_block<I: InstructionSet, const PERSPECTIVE: bool, const INVERSE: bool>(
@@ -128,7 +111,7 @@ fn spread_block<I: InstructionSet, const PERSPECTIVE: bool, const INVERSE: bool>
     part: usize,
     pixels: &mut BlockGradients,
     total: &mut EntrySums<I::Lanes>,
-) -> I::Lanes {
+) {
     let unbounded = brush.alpha(isa, at);
     let greatest = isa.splat(GREATEST_ALPHA);
     let alpha = unbounded.min(greatest).only(drawn);
@@ -166,44 +149,39 @@ fn spread_block<I: InstructionSet, const PERSPECTIVE: bool, const INVERSE: bool>
     let strength = alpha.mul(by_alpha).only(unbounded.at_most(greatest));
     total[9] = total[9].add(strength);
     let by_depth = weight.mul(by_depth);
-    add_plane::<I, PERSPECTIVE>(isa, brush, at, strength, by_depth, total);
-    strength
+    add_plane::<I::Lanes, PERSPECTIVE>(brush, at, strength, by_depth, total);
 }
 
 /// Adds the gradient by position and shape. `strength` is α ∂L/∂α, so that ∂L/∂ρ is −½ of it.
 #[inline(always)]
-fn add_plane<I: InstructionSet, const PERSPECTIVE: bool>(
-    isa: I,
-    brush: &Brush<I::Lanes>,
-    at: &Footprint<I::Lanes>,
-    strength: I::Lanes,
-    by_depth: I::Lanes,
-    total: &mut EntrySums<I::Lanes>,
+fn add_plane<L: Lanes, const PERSPECTIVE: bool>(
+    brush: &Brush<L>,
+    at: &Footprint<L>,
+    strength: L,
+    by_depth: L,
+    total: &mut EntrySums<L>,
 ) {
-    let zero = isa.splat(0.0);
     let [u, v] = at.uv;
-    // ∂L/∂u = −pull · u.
-    let pull = at.on_plane(strength, zero);
-    let (pull_u, pull_v) = (pull.mul(u), pull.mul(v));
+    // ∂L/∂u = −strength · u.
+    let (pull_u, pull_v) = (strength.mul(u), strength.mul(v));
     total[0] = pull_u.mul_add(u, total[0]);
     total[1] = pull_u.mul_add(v, total[1]);
     total[2] = pull_v.mul_add(v, total[2]);
     let turn = if PERSPECTIVE {
         let scaled = by_depth.mul(at.r);
-        total[8] = total[8].add(at.on_plane(scaled, by_depth));
+        total[8] = total[8].add(scaled);
         total[5] = pull_u.mul_add(at.r, total[5]);
         total[6] = pull_v.mul_add(at.r, total[6]);
         // −∂L/∂(1/r) / r, from the position in the plane and from the depth.
-        let turn = pull.neg_mul_add(at.in_plane, at.on_plane(scaled.mul(brush.depth), zero));
+        let turn = strength.neg_mul_add(at.rho, scaled.mul(brush.depth));
         total[7] = turn.mul_add(at.r, total[7]);
         turn
     } else {
         total[8] = total[8].add(by_depth);
         total[5] = total[5].add(pull_u);
         total[6] = total[6].add(pull_v);
-        let turn = at.on_plane(by_depth, zero);
-        total[7] = total[7].add(turn);
-        turn
+        total[7] = total[7].add(by_depth);
+        by_depth
     };
     total[3] = turn.mul_add(u, total[3]);
     total[4] = turn.mul_add(v, total[4]);

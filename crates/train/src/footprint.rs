@@ -1,7 +1,7 @@
 //! Where and how strongly a splat covers the pixels of a block, as both passes compute it.
 
 use crate::arrange::TILE;
-use crate::screen::{LOW_PASS_PER_PX2, ScreenSplat};
+use crate::screen::ScreenSplat;
 use crate::simd::{Block, InstructionSet, LANES, Lanes, exp2};
 
 /// Columns and rows of a block.
@@ -13,7 +13,7 @@ pub(crate) const GREATEST_ALPHA: f32 = 0.99;
 /// Transmittance below which a pixel takes no more splats.
 pub(crate) const LEAST_TRANSMITTANCE: f32 = 1e-4;
 /// Least ratio of the centre's depth to that of an intersection. Beyond it, the plane runs towards
-/// the horizon, and only the least footprint around the centre is drawn.
+/// the horizon, and nothing is drawn.
 const LEAST_DEPTH_RATIO: f32 = 0.05;
 
 /// Columns and rows of the pixels of a block. A tile has as many blocks as a block has pixels, so
@@ -45,11 +45,9 @@ pub(crate) fn blocks_within(splat: &ScreenSplat, tile_origin: [usize; 2]) -> u32
 
 /// A splat in the registers, for the blocks of a tile.
 pub(crate) struct Brush<L> {
-    /// Offset of the first pixel of each block from the centre, pixels.
-    offsets: [Block; 2],
-    /// A · that offset.
+    /// L⁻¹ · the offset of the first pixel of each block from the centre.
     origins: [Block; 2],
-    /// A · the place of a pixel within its block, for each part.
+    /// L⁻¹ · the place of a pixel within its block, for each part.
     within: [[L; 2]; 2],
     pub(crate) slopes: [L; 2],
     pub(crate) depth: L,
@@ -71,20 +69,8 @@ pub(crate) struct Footprint<L: Lanes> {
     ratio: L,
     /// Position in the plane, standard deviations.
     pub(crate) uv: [L; 2],
-    /// u² + v².
-    pub(crate) in_plane: L,
-    /// Squared distance from the centre: that in the plane or that in the image.
-    rho: L,
-    /// Of splats that may be finer than the least footprint.
-    fine: Option<FineFootprint<L>>,
-}
-
-/// What the least footprint around the centre needs.
-struct FineFootprint<L: Lanes> {
-    /// Offset from the centre, pixels.
-    offset: [L; 2],
-    /// Where the ellipse is drawn rather than the least footprint.
-    on_plane: L::Mask,
+    /// u² + v²: the squared distance from the centre.
+    pub(crate) rho: L,
 }
 
 impl<L: Lanes> Brush<L> {
@@ -98,7 +84,7 @@ impl<L: Lanes> Brush<L> {
         let [a0, b0, a1, b1] = splat.inverse;
         // Lanes are not made in closures, which would not be compiled for the instruction set.
         let (a0, b0, a1, b1) = (isa.splat(a0), isa.splat(b0), isa.splat(a1), isa.splat(b1));
-        let (mut offsets, mut origins) = ([Block::ZERO; 2], [Block::ZERO; 2]);
+        let mut origins = [Block::ZERO; 2];
         let mut within = [[isa.splat(0.0); 2]; 2];
         // Whole pixels are subtracted first: no digit of the fraction is lost near the centre.
         let centre = [0, 1].map(|i| splat.pixel[i] - tile_origin[i] as f64);
@@ -112,14 +98,11 @@ impl<L: Lanes> Brush<L> {
             let (column, row) = (isa.load(&COLUMNS, part), isa.load(&ROWS, part));
             let dx = column.add(blocks_x).mul_add(side, fraction_x);
             let dy = row.add(blocks_y).mul_add(side, fraction_y);
-            dx.store(&mut offsets[0], part);
-            dy.store(&mut offsets[1], part);
             a0.mul_add(dx, b0.mul(dy)).store(&mut origins[0], part);
             a1.mul_add(dx, b1.mul(dy)).store(&mut origins[1], part);
             *within = [a0.mul_add(column, b0.mul(row)), a1.mul_add(column, b1.mul(row))];
         }
         Self {
-            offsets,
             origins,
             within,
             slopes: [isa.splat(splat.slopes[0]), isa.splat(splat.slopes[1])],
@@ -132,10 +115,9 @@ impl<L: Lanes> Brush<L> {
         }
     }
 
-    /// Intersects the rays of pixels with the plane. `FINE` for splats that may be finer than the
-    /// least footprint.
+    /// Intersects the rays of pixels with the plane. `WIDE` for splats that reach to the horizon.
     #[inline(always)]
-    pub(crate) fn at<I: InstructionSet<Lanes = L>, const PERSPECTIVE: bool, const FINE: bool>(
+    pub(crate) fn at<I: InstructionSet<Lanes = L>, const PERSPECTIVE: bool, const WIDE: bool>(
         &self,
         isa: I,
         block: usize,
@@ -155,18 +137,8 @@ impl<L: Lanes> Brush<L> {
             (one, p)
         };
         let in_plane = uv[0].mul_add(uv[0], uv[1].mul(uv[1]));
-        if !FINE {
-            return Footprint { r, ratio: bounded, uv, in_plane, rho: in_plane, fine: None };
-        }
-        let dx = isa.load(&COLUMNS, part).add(isa.splat(self.offsets[0].0[block]));
-        let dy = isa.load(&ROWS, part).add(isa.splat(self.offsets[1].0[block]));
-        let in_image = dx.mul_add(dx, dy.mul(dy)).mul(isa.splat(LOW_PASS_PER_PX2 as f32));
-        let mut on_plane = in_plane.at_most(in_image);
-        if PERSPECTIVE {
-            on_plane = L::both(on_plane, least.at_most(ratio));
-        }
-        let rho = in_plane.or_else(on_plane, in_image);
-        Footprint { r, ratio: bounded, uv, in_plane, rho, fine: Some(FineFootprint { offset: [dx, dy], on_plane }) }
+        let rho = if WIDE { in_plane.or_else(least.at_most(ratio), isa.splat(f32::MAX)) } else { in_plane };
+        Footprint { r, ratio: bounded, uv, rho }
     }
 
     /// Returns where the splat is drawn.
@@ -184,14 +156,10 @@ impl<L: Lanes> Brush<L> {
     /// Returns the depth at pixels, measured from the reference depth.
     #[inline(always)]
     pub(crate) fn depth<const PERSPECTIVE: bool>(&self, at: &Footprint<L>) -> L {
-        let on_plane = if PERSPECTIVE {
+        if PERSPECTIVE {
             self.depth.mul_add(at.r, self.minus_reference)
         } else {
             at.uv[1].mul_add(self.slopes[1], at.uv[0].mul_add(self.slopes[0], self.relative_depth))
-        };
-        match &at.fine {
-            Some(fine) => on_plane.or_else(fine.on_plane, self.relative_depth),
-            None => on_plane,
         }
     }
 
@@ -199,8 +167,7 @@ impl<L: Lanes> Brush<L> {
     /// reference depth, less 1.
     #[inline(always)]
     pub(crate) fn inverse_depth<I: InstructionSet<Lanes = L>>(&self, isa: I, at: &Footprint<L>) -> L {
-        let one = isa.splat(1.0);
-        at.on_plane(at.ratio, one).mul_add(self.reference_ratio, isa.splat(-1.0))
+        at.ratio.mul_add(self.reference_ratio, isa.splat(-1.0))
     }
 
     /// Returns the derivative of [`Self::inverse_depth`], which is given, by the depth.
@@ -209,26 +176,6 @@ impl<L: Lanes> Brush<L> {
         // The reference depth over the squared depth, as both are measured.
         let whole = inverse_depth.add(isa.splat(1.0));
         whole.mul(whole).div(self.minus_reference)
-    }
-}
-
-impl<L: Lanes> Footprint<L> {
-    /// Returns values where the ellipse is drawn, and `other` where the least footprint is.
-    #[inline(always)]
-    pub(crate) fn on_plane(&self, lanes: L, other: L) -> L {
-        match &self.fine {
-            Some(fine) => lanes.or_else(fine.on_plane, other),
-            None => lanes,
-        }
-    }
-
-    /// Returns the offsets from the centre, and where of the given pixels the least footprint is
-    /// drawn; `None` where it is nowhere.
-    #[inline(always)]
-    pub(crate) fn least(&self, drawn: L::Mask) -> Option<([L; 2], L::Mask)> {
-        let fine = self.fine.as_ref()?;
-        let least = L::only_first(drawn, fine.on_plane);
-        L::any(least).then_some((fine.offset, least))
     }
 }
 

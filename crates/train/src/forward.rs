@@ -117,7 +117,7 @@ pub(crate) fn draw<I: InstructionSet, const PERSPECTIVE: bool, const INVERSE: bo
             let (mut drawn, mut alive) = (0, false);
             for part in 0..I::PARTS {
                 let sums = &mut out.sums[block];
-                let (pixels, is_alive) = if splat.is_fine {
+                let (pixels, is_alive) = if splat.is_wide {
                     draw_block::<I, PERSPECTIVE, INVERSE, true>(isa, &brush, splat, block, part, sums)
                 } else {
                     draw_block::<I, PERSPECTIVE, INVERSE, false>(isa, &brush, splat, block, part, sums)
@@ -144,7 +144,7 @@ pub(crate) fn draw<I: InstructionSet, const PERSPECTIVE: bool, const INVERSE: bo
 /// Draws a splat on a part of a block. Returns at which pixels, and whether any pixel takes more
 /// splats.
 #[inline(always)]
-fn draw_block<I: InstructionSet, const PERSPECTIVE: bool, const INVERSE: bool, const FINE: bool>(
+fn draw_block<I: InstructionSet, const PERSPECTIVE: bool, const INVERSE: bool, const WIDE: bool>(
     isa: I,
     brush: &Brush<I::Lanes>,
     splat: &ScreenSplat,
@@ -154,7 +154,7 @@ fn draw_block<I: InstructionSet, const PERSPECTIVE: bool, const INVERSE: bool, c
 ) -> (u16, bool) {
     let before = isa.load(&sums.transmittance, part);
     let takes = isa.splat(LEAST_TRANSMITTANCE).at_most(before);
-    let at = brush.at::<I, PERSPECTIVE, FINE>(isa, block, part);
+    let at = brush.at::<I, PERSPECTIVE, WIDE>(isa, block, part);
     let drawn = I::Lanes::both(brush.reaches(&at), takes);
     // A register is rarely in vain, and a branch would be guessed wrong.
     let alpha = brush.alpha(isa, &at).min(isa.splat(GREATEST_ALPHA)).only(drawn);

@@ -6,6 +6,14 @@
 //! u = p₀ r, v = p₁ r with (p₀, p₁) = A · offset, A = [j_u j_v]⁻¹ and r = 1 / (1 − ζ_u p₀ − ζ_v
 //! p₁).
 //! The depth there is z₀ r. For an affine camera r = 1, and the depth is z₀ + γ_u u + γ_v v.
+//!
+//! A pixel shows the mean over its area. So the Gaussian is blurred in its own plane by the pixel
+//! as the plane sees it: its covariance 1 becomes 1 + s A Aᵀ with the variance s of a pixel, and
+//! its opacity falls by the factor that its area grows by (the 2D filter of Yu et al., "Mip-
+//! Splatting", CVPR 2024, in the plane of the splat as Younes and Boukhayma, "Anti-Aliased 2D
+//! Gaussian Splatting", 2025). With J Jᵀ + s = L Lᵀ, that is the splat whose derivatives of the
+//! pixel are L instead of J = [j_u j_v], in the same plane: its ζ are Lᵀ Aᵀ ζ. From then on there
+//! is no difference between splats, however fine they are.
 
 use crate::surfel::Surfel;
 use crate::view::LocalView;
@@ -15,10 +23,8 @@ pub(crate) const LEAST_ALPHA: f64 = 1.0 / 255.0;
 /// Sine of the angle between a splat and the line of sight below which it is not drawn (1.1°). It
 /// is thinner than a pixel there, and its inverse has no precision in f32.
 const EDGE_ON: f64 = 0.02;
-/// Room for rounding when splats are told to be coarser than the least footprint.
-const ROUNDED: f64 = 0.999;
-/// Inverse variance of the least footprint, px⁻²: that of the 2DGS code.
-pub(crate) const LOW_PASS_PER_PX2: f64 = 2.0;
+/// Variance of a pixel, px²: that of Mip-Splatting, close to the 1/12 of a square.
+const PIXEL_PX2: f64 = 0.1;
 
 /// Gradient slots of a splat in the image. With u and v the position in the plane, s the gradient
 /// α ∂L/∂α and t that by 1 / r (perspective) or by the depth (affine), they are, in this order:
@@ -32,9 +38,9 @@ pub(crate) type ScreenGradient = [f32; 16];
 pub(crate) struct ScreenSplat {
     /// Column and row of the centre.
     pub(crate) pixel: [f64; 2],
-    /// A by rows: standard deviations per pixel.
+    /// L⁻¹ by rows: standard deviations of the blurred splat per pixel.
     pub(crate) inverse: [f32; 4],
-    /// ζ of a perspective camera, γ (metres) of an affine one.
+    /// ζ of a perspective camera, γ (metres) of an affine one, of the blurred splat.
     pub(crate) slopes: [f32; 2],
     /// Depth of the centre, metres.
     pub(crate) depth: f32,
@@ -47,8 +53,8 @@ pub(crate) struct ScreenSplat {
     pub(crate) cutoff: f32,
     /// First and last column, first and last row; inside the image.
     pub(crate) bounds: [u16; 4],
-    /// Whether the least footprint may reach beyond the ellipse somewhere.
-    pub(crate) is_fine: bool,
+    /// Whether the plane runs to the horizon or behind the camera within the splat.
+    pub(crate) is_wide: bool,
 }
 
 impl ScreenSplat {
@@ -63,7 +69,7 @@ impl ScreenSplat {
         normal: [0.0; 3],
         cutoff: 0.0,
         bounds: [0; 4],
-        is_fine: true,
+        is_wide: false,
     };
 
     /// Returns whether the splat is drawn.
@@ -119,22 +125,41 @@ impl Plane {
         let inverse = [[vy / determinant, -vx / determinant], [-uy / determinant, ux / determinant]];
         Some(Self { axes, scale, in_image, slopes, inverse, turned: if facing > 0.0 { -1.0 } else { 1.0 } })
     }
+}
 
-    /// Returns whether the least footprint may reach beyond the ellipse somewhere.
-    ///
-    /// Within the ellipse |(u, v)| ≤ c = √cutoff, so that r = 1 + ζ·(u, v) ≤ 1 + |ζ| c. Where the
-    /// greatest singular value of A times that is at most √2, u² + v² ≤ 2 |offset|² in the
-    /// ellipse, and the circle 2 |offset|² ≤ cutoff lies within it. With |ζ| c < 1 it lies before
-    /// the camera.
-    fn is_fine(&self, cutoff: f64, perspective: bool) -> bool {
-        let [[a0, b0], [a1, b1]] = self.inverse;
-        let (squares, determinant) = (a0 * a0 + b0 * b0 + a1 * a1 + b1 * b1, a0 * b1 - b0 * a1);
-        let spread = (squares * squares - 4.0 * determinant * determinant).max(0.0).sqrt();
-        let greatest_squared = 0.5 * (squares + spread);
-        let slope = if perspective { (cutoff * dot2(self.slopes, self.slopes)).sqrt() } else { 0.0 };
-        let is_coarse =
-            slope < ROUNDED && greatest_squared * (1.0 + slope) * (1.0 + slope) < LOW_PASS_PER_PX2 * ROUNDED;
-        !is_coarse
+/// A splat after the blur of a pixel.
+struct Blurred {
+    /// The columns of L.
+    in_image: [[f64; 2]; 2],
+    /// L⁻¹ by rows.
+    inverse: [[f64; 2]; 2],
+    /// Aᵀ ζ: the change of 1 / r, or of the depth, by a pixel.
+    by_pixel: [f64; 2],
+    /// Lᵀ Aᵀ ζ.
+    slopes: [f64; 2],
+    /// Natural logarithm of the factor of the opacity.
+    log_share: f64,
+}
+
+impl Blurred {
+    fn new(plane: &Plane) -> Self {
+        let [[ux, uy], [vx, vy]] = plane.in_image;
+        let determinant = ux * vy - vx * uy;
+        let (xx, xy, yy) = (ux * ux + vx * vx, ux * uy + vx * vy, uy * uy + vy * vy);
+        // Of J Jᵀ + s; no difference of large numbers as that of the sums would be.
+        let blurred = determinant * determinant + PIXEL_PX2 * (xx + yy) + PIXEL_PX2 * PIXEL_PX2;
+        let first = (xx + PIXEL_PX2).sqrt();
+        let (across, second) = (xy / first, blurred.sqrt() / first);
+        let [[a0, b0], [a1, b1]] = plane.inverse;
+        let [zu, zv] = plane.slopes;
+        let by_pixel = [a0 * zu + a1 * zv, b0 * zu + b1 * zv];
+        Self {
+            in_image: [[first, across], [0.0, second]],
+            inverse: [[1.0 / first, 0.0], [-across / (first * second), 1.0 / second]],
+            by_pixel,
+            slopes: [first * by_pixel[0] + across * by_pixel[1], second * by_pixel[1]],
+            log_share: determinant.abs().ln() - 0.5 * blurred.ln(),
+        }
     }
 
     /// Returns least and greatest offsets from the centre's pixel at which the splat is drawn, or
@@ -146,31 +171,62 @@ impl Plane {
         if beyond > -1e-3 {
             return None;
         }
-        let low_pass = (cutoff / LOW_PASS_PER_PX2).sqrt();
         Some([0, 1].map(|i| {
             // The tangents of the ellipse's image are the roots of a quadratic equation.
             let (square, mixed) = (cutoff * (u[i] * u[i] + v[i] * v[i]), cutoff * (u[i] * zu + v[i] * zv));
             let root = (mixed * mixed - square * beyond).max(0.0).sqrt();
-            let ends = [(mixed + root) / beyond, (mixed - root) / beyond];
-            [ends[0].min(-low_pass), ends[1].max(low_pass)]
+            [(mixed + root) / beyond, (mixed - root) / beyond]
         }))
+    }
+
+    /// Returns the gradient by the axes in the image, j_u and j_v, and by ζ, given that by the
+    /// blurred splat: its axes, its ζ and the logarithm of its opacity.
+    fn gradient(
+        &self,
+        plane: &Plane,
+        by_axes: [[f64; 2]; 2],
+        by_slopes: [f64; 2],
+        by_share: f64,
+    ) -> ([[f64; 2]; 2], [f64; 2]) {
+        let [j, a, own, l] = [plane.in_image, plane.inverse, self.inverse, self.in_image];
+        let g = self.by_pixel;
+        // ζ of the blurred splat is Lᵀ g, with g = Aᵀ ζ.
+        let by_l = [0, 1].map(|k| [0, 1].map(|i| by_axes[k][i] + g[i] * by_slopes[k]));
+        let by_g = [0, 1].map(|i| l[0][i] * by_slopes[0] + l[1][i] * by_slopes[1]);
+        // What is drawn depends on L by L Lᵀ alone, so that the gradient by L is 2 S L with a
+        // symmetric S, which is the gradient by L Lᵀ = J Jᵀ + s.
+        let twice = [0, 1].map(|i| [0, 1].map(|k| by_l[0][i] * own[0][k] + by_l[1][i] * own[1][k]));
+        let mixed = 0.5 * (twice[0][1] + twice[1][0]);
+        let twice = [[twice[0][0], mixed], [mixed, twice[1][1]]];
+        let by_zeta = a.map(|row| dot2(row, by_g));
+        let precision = [0, 1].map(|i| [0, 1].map(|k| own[0][i] * own[0][k] + own[1][i] * own[1][k]));
+        let by_j = [0, 1].map(|k| {
+            [0, 1].map(|i| {
+                let share = a[k][i] - dot2(precision[i], j[k]);
+                dot2(twice[i], j[k]) - g[i] * by_zeta[k] + by_share * share
+            })
+        });
+        (by_j, by_zeta)
     }
 }
 
 /// Returns the splat that a camera sees of a surfel; `None` where nothing of it is drawn.
 pub(crate) fn project(surfel: &Surfel, view: &LocalView, perspective: bool, size: [usize; 2]) -> Option<ScreenSplat> {
-    let opacity = surfel.opacity();
-    let log_opacity = opacity.ln();
-    let cutoff = 2.0 * (log_opacity - LEAST_ALPHA.ln());
-    // NaN is not visible either.
-    let visible = cutoff > 0.0;
-    if !visible {
-        return None;
-    }
+    let visible = |log_opacity: f64| {
+        let cutoff = 2.0 * (log_opacity - LEAST_ALPHA.ln());
+        // NaN is not visible either.
+        (cutoff > 0.0).then_some(cutoff)
+    };
+    let log_opacity = surfel.opacity().ln();
+    visible(log_opacity)?;
     let plane = Plane::new(surfel, view, perspective)?;
+    let blurred = Blurred::new(&plane);
+    let log_opacity = log_opacity + blurred.log_share;
+    let cutoff = visible(log_opacity)?;
     let last = size.map(|s| s as f64 - 1.0);
     let mut bounds = [0, last[0] as u16, 0, last[1] as u16];
-    if let Some(reach) = plane.reach(cutoff, perspective) {
+    let reach = blurred.reach(cutoff, perspective);
+    if let Some(reach) = reach {
         for i in 0..2 {
             let [from, to] = reach[i].map(|offset| view.pixel[i] + offset);
             let meets = to >= 0.0 && from <= last[i];
@@ -181,18 +237,18 @@ pub(crate) fn project(surfel: &Surfel, view: &LocalView, perspective: bool, size
             bounds[2 * i + 1] = to.floor().clamp(0.0, last[i]) as u16;
         }
     }
-    let [[a0, b0], [a1, b1]] = plane.inverse;
+    let [[a0, b0], [a1, b1]] = blurred.inverse;
     let made = ScreenSplat {
         pixel: view.pixel,
         inverse: [a0, b0, a1, b1].map(|a| a as f32),
-        slopes: plane.slopes.map(|s| s as f32),
+        slopes: blurred.slopes.map(|s| s as f32),
         depth: view.depth_m as f32,
         log2_opacity: (log_opacity * std::f64::consts::LOG2_E) as f32,
         colour: surfel.colour,
         normal: plane.axes[2].map(|n| (plane.turned * n) as f32),
         cutoff: cutoff as f32,
         bounds,
-        is_fine: plane.is_fine(cutoff, perspective),
+        is_wide: reach.is_none(),
     };
     let drawn = bounds[0] <= bounds[1] && bounds[2] <= bounds[3];
     let finite = made.inverse.iter().chain(&made.slopes).all(|v| v.is_finite());
@@ -203,13 +259,14 @@ pub(crate) fn project(surfel: &Surfel, view: &LocalView, perspective: bool, size
 pub(crate) fn gradient(surfel: &Surfel, view: &LocalView, perspective: bool, by_splat: &[f64; 16]) -> Surfel {
     let Some(plane) = Plane::new(surfel, view, perspective) else { return Surfel::default() };
     let [suu, suv, svv, gs_u, gs_v, gx, gy, _, gz, sum, red, green, blue, nx, ny, nz] = *by_splat;
-    let [[a0, b0], [a1, b1]] = plane.inverse;
+    let blurred = Blurred::new(&plane);
+    let [[a0, b0], [a1, b1]] = blurred.inverse;
     let by_slopes = [gs_u, gs_v];
-    // S = Σ ∂L/∂p ⊗ p. With A = J⁻¹, the gradient by J is −Aᵀ S.
+    // S = Σ ∂L/∂p ⊗ p. With p = L⁻¹ · offset, the gradient by L is −L⁻ᵀ S.
     let pulled = [[suu, suv], [suv, svv]];
-    let s = [0, 1].map(|i| [0, 1].map(|j| plane.slopes[i] * by_slopes[j] - pulled[i][j]));
-    // Columns of J are the axes in the image.
+    let s = [0, 1].map(|i| [0, 1].map(|j| blurred.slopes[i] * by_slopes[j] - pulled[i][j]));
     let by_image = [0, 1].map(|k| [-(a0 * s[0][k] + a1 * s[1][k]), -(b0 * s[0][k] + b1 * s[1][k])]);
+    let (by_image, by_slopes) = blurred.gradient(&plane, by_image, by_slopes, sum);
     let depth = if perspective { view.depth_m } else { 1.0 };
     let [column, row] = view.jacobian;
     // By the scaled axes in space.

@@ -331,6 +331,39 @@ fn gradients_hold_for_a_thin_surfel_that_is_almost_seen_from_the_edge() {
 }
 
 #[test]
+fn a_splat_covers_its_area_however_fine_the_pixels_are() {
+    // Facing the camera, and turned by 60 degrees.
+    for (rotation, facing) in [([1.0, 0.0, 0.0, 0.0], 1.0), ([0.75f32.sqrt(), 0.5, 0.0, 0.0], 0.5)] {
+        for finer in [1.0, 2.0, 4.0] {
+            let camera = PinholeView {
+                rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+                centre: [0.0; 3],
+                focal_px: [20.0 * finer; 2],
+                principal_px: [10.0 * finer - 0.5; 2],
+                size: [20 * finer as usize; 2],
+            };
+            // The mean over places within a pixel, about the axis of the camera.
+            let covered = |place: u8| {
+                let surfel = Surfel {
+                    position: [0.0625 * (f32::from(place % 4) - 1.5), 0.0625 * (f32::from(place / 4) - 1.5), 5.0],
+                    rotation,
+                    log_scale: [0.05f32.ln(); 2],
+                    opacity_logit: 0.0,
+                    colour: [1.0; 3],
+                };
+                let drawing = Drawing::new(&[surfel], &camera, Registers::Longest);
+                drawing.images().coverage.iter().map(|c| f64::from(*c)).sum::<f64>() / 16.0
+            };
+            let mean: f64 = (0..16).map(covered).sum();
+            // Pixels of a standard deviation; what is fainter than 1 in 255 is not drawn.
+            let sigma = 0.05 * 20.0 * finer / 5.0;
+            let whole = 0.5 * std::f64::consts::TAU * sigma * sigma * facing;
+            assert!((0.93..1.01).contains(&(mean / whole)), "{finer} {facing}: {mean} is not {whole}");
+        }
+    }
+}
+
+#[test]
 fn nothing_is_drawn_of_nothing() {
     let (camera, _) = pinhole();
     let empty = Drawing::new(&[], &camera, Registers::Longest);

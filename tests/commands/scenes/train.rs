@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use crate::common::{sample, simulated, skysweep};
 use crs::Crs;
-use io::raster::{Band, BandData, CogRaster, read_dem, write_cog, write_png_rgb};
+use io::raster::{Band, BandData, CogRaster, read_dem, write_cog, write_png_gray, write_png_rgb};
 use jobs::train::{SatelliteTrainConfig, TrainConfig, TrainError, run, run_on_images};
 use numeric::{Choice, Progress, Silent, upper_median};
 use predicates::prelude::*;
@@ -157,6 +157,99 @@ fn recipes_are_chosen_and_their_numbers_given() {
     refused(&["--step", "scale=-1"], "scale is -1");
     refused(&["--schedule", "degree=4"], "the degree of the harmonics is 4, expected 0, 1, 2 or 3");
     refused(&["--hold-out-view", "flight_13.png"], "0 views have the name flight_13.png");
+}
+
+/// What lies under a mask changes nothing, and a mask that is not there or does not fit is told.
+#[test]
+fn masked_pixels_take_no_part() {
+    let out = tempfile::tempdir().unwrap();
+    let names: Vec<String> = (1..=12).map(|number| format!("flight_{number:02}.png")).collect();
+    let put = |folder: &str, painted: Option<u8>| {
+        let folder = out.path().join(folder);
+        std::fs::create_dir_all(&folder).unwrap();
+        for name in &names {
+            let source = io::raster::ImageSource::open(dataset().join("images").join(name)).unwrap();
+            let mut picture = source.read_colour(source.window()).unwrap().map(|p| p.map(|c| c as u8));
+            let (width, third) = (picture.width(), picture.width() / 3);
+            for (pixel, value) in picture.data_mut().iter_mut().enumerate() {
+                *value = painted.filter(|_| pixel % width < third).map_or(*value, |tone| [tone; 3]);
+            }
+            write_png_rgb(folder.join(name), &picture, true).unwrap();
+            let mask = Grid::from_vec(
+                width,
+                picture.height(),
+                (0..picture.data().len()).map(|i| if i % width < third { 0 } else { 255 }).collect(),
+            );
+            write_png_gray(out.path().join("masks").join(format!("{name}.png")), &mask.unwrap(), true).unwrap();
+        }
+        folder
+    };
+    std::fs::create_dir_all(out.path().join("masks")).unwrap();
+    let masks = out.path().join("masks");
+    let trained = |pictures: &Path, output: &str, masks: &Path| {
+        let output = out.path().join(output);
+        let (pictures, masks) = (pictures.to_str().unwrap(), masks.to_str().unwrap());
+        let chosen = ["--iterations", "20", "--pictures", pictures, "--masks", masks];
+        (train(&output, &chosen), output)
+    };
+    let results = [("white", 255), ("black", 0)].map(|(name, tone)| {
+        let (told, output) = trained(&put(name, Some(tone)), &format!("trained_{name}"), &masks);
+        told.success();
+        let report = report_of(&output);
+        let quality: Vec<_> = report["views"].as_array().unwrap().iter().map(|v| v["psnr_db"].as_f64()).collect();
+        (std::fs::read(output.join("splats.ply")).unwrap(), quality)
+    });
+    assert!(results[0] == results[1], "what is masked changes the result");
+    let plain = put("plain", None);
+    let refused = |what: &str| {
+        let (told, _) = trained(&plain, "refused", &masks);
+        told.code(2).stderr(predicate::str::contains(what.to_owned()));
+    };
+    let path = masks.join("flight_03.png.png");
+    std::fs::remove_file(&path).unwrap();
+    refused("flight_03.png has no mask, expected flight_03.png.png or flight_03.png in");
+    write_png_gray(&path, &Grid::filled(7, 5, 255), true).unwrap();
+    refused("the mask has [7, 5] columns and rows, its camera");
+    let size = io::colmap::read(&dataset().join("sparse/0")).unwrap().lenses[0].clone();
+    write_png_gray(&path, &Grid::filled(size.width(), size.height(), 0), true).unwrap();
+    refused("the mask of flight_03.png is 0 everywhere");
+}
+
+/// Cameras of a transforms.json begin with random points, or with those of a model.
+#[test]
+fn transforms_are_trained_on() {
+    let out = tempfile::tempdir().unwrap();
+    let root = out.path().join("scene");
+    let model = io::colmap::read(&dataset().join("sparse/0")).unwrap();
+    std::fs::create_dir_all(root.join("images")).unwrap();
+    let frame = |view: &io::colmap::ColmapView| {
+        std::fs::copy(dataset().join("images").join(&view.name), root.join("images").join(&view.name)).unwrap();
+        let (lens, r, c) = (&model.lenses[view.lens], view.pose.rotation, view.pose.centre);
+        let ([fx, fy], at) = (lens.focal_px(), lens.principal_point());
+        // The columns of OpenGL point to the right, up and back.
+        let mut matrix: Vec<Vec<f64>> = (0..3).map(|i| vec![r[0][i], -r[1][i], -r[2][i], c[i]]).collect();
+        matrix.push(vec![0.0, 0.0, 0.0, 1.0]);
+        serde_json::json!({
+            "file_path": format!("./images/{}", view.name.trim_end_matches(".png")), "transform_matrix": matrix,
+            "w": lens.width(), "h": lens.height(), "fl_x": fx, "fl_y": fy, "cx": at.sample + 0.5, "cy": at.line + 0.5,
+        })
+    };
+    let frames: Vec<_> = model.views.iter().map(frame).collect();
+    std::fs::write(root.join("transforms.json"), serde_json::json!({ "frames": frames }).to_string()).unwrap();
+    let output = out.path().join("a");
+    let mut command = skysweep();
+    command.arg("train").arg(&root).arg("-o").arg(&output).args(["--shrink", "4", "--iterations", "60"]);
+    command.assert().success().stderr(predicate::str::contains("the training begins with"));
+    let report = report_of(&output);
+    assert_eq!((held_out(&report).len(), report["preset"].as_str()), (2, Some("photographs")));
+    let trained: Vec<_> = report["views"].as_array().unwrap().iter().filter(|v| v["held_out"] == false).collect();
+    let mean = |key: &str| trained.iter().map(|v| v[key].as_f64().unwrap()).sum::<f64>() / trained.len() as f64;
+    assert!(mean("ssim") > mean("ssim_before") + 0.15, "{report}");
+    // The model of the same cameras names its images without their folder.
+    let mut command = skysweep();
+    command.arg("train").arg(&root).arg("--points").arg(dataset()).arg("-o").arg(out.path().join("b"));
+    let told = command.args(["--shrink", "4", "--iterations", "2"]).assert().success();
+    told.stderr(predicate::str::contains("random").not());
 }
 
 /// A dataset in the layout of many reconstructions: the model in a folder of its own, the images in

@@ -1989,6 +1989,7 @@ def train(
     *,
     more_points: PathLike | None = None,
     images: PathLike | None = None,
+    masks: PathLike | None = None,
     iterations: int = 3000,
     budget: int = 100000,
     shrink: int = 1,
@@ -2019,6 +2020,8 @@ def train(
             the dataset, such as the reconstruction that the cameras come from.
         images: Folder of the images; when `None`, `images` of the dataset or the folder in or
             beside it that has the images of the model.
+        masks: Folder of a mask for each image, `NAME.jpg.png` or `NAME.png`: pixels that are 0
+            there count neither in the training nor in the judgement.
         iterations: Number of iterations; each draws one view.
         budget: Greatest number of splats. The training begins with at most half of them.
         shrink: Pixels of an image that become one, in each direction.

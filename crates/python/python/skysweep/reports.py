@@ -4478,6 +4478,10 @@ class TrainConfig(Report):
     """Folder of the images; when `None`, `images` of the dataset or the folder in or beside it
     that has the images of the model."""
 
+    masks: str | None
+    """Folder of a mask for each image, `NAME.jpg.png` or `NAME.png`: pixels that are 0 there
+    count neither in the training nor in the judgement."""
+
     output: str
     """Folder for the results."""
 

@@ -45,6 +45,9 @@ pub struct TrainConfig {
     /// Folder of the images; when `None`, `images` of the dataset or the folder in or beside it
     /// that has the images of the model.
     pub images: Option<PathBuf>,
+    /// Folder of a mask for each image, `NAME.jpg.png` or `NAME.png`: pixels that are 0 there count
+    /// neither in the training nor in the judgement.
+    pub masks: Option<PathBuf>,
     /// Folder for the results.
     pub output: PathBuf,
     /// Number of iterations; each draws one view.
@@ -94,6 +97,7 @@ impl TrainConfig {
             dataset,
             more_points: None,
             images: None,
+            masks: None,
             output,
             iterations: 3000,
             budget: 100_000,

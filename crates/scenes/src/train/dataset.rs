@@ -3,19 +3,20 @@
 use std::path::{Path, PathBuf};
 
 use ::train::{PinholeView, TrainingView};
-use camera::Lens;
-use io::colmap::{ColmapPoint, ColmapView, read_with_points};
+use io::colmap::{ColmapPoint, read_with_points};
 use io::npy::{self, NpyArray, NpyData};
-use io::raster::ImageSource;
 use numeric::Progress;
 use priors::Schedule;
+use raster::Grid;
 use serde_json::Value;
 
 use super::config::{TrainConfig, TrainPriors};
 use super::error::TrainError;
 use super::held_out::held_out;
+use super::picture::{self, Left, Undistortion};
 use super::place::{DatasetPlace, more_points};
 use super::recipe::TrainPreset;
+use super::transforms;
 use crate::small_view::{pinhole, shrunk};
 use job::dataset_folder::{pictures_folder, sparse_folder};
 use job::files;
@@ -47,7 +48,16 @@ impl TrainData {
     pub(super) fn read(config: &TrainConfig, progress: &dyn Progress) -> Result<Self, TrainError> {
         let folder = &config.dataset;
         let sparse = sparse_folder(folder);
-        let (mut model, mut points) = read_with_points(&sparse)?;
+        let transforms = transforms::file(folder, &sparse);
+        let (mut model, mut points) = match &transforms {
+            Some(path) => (transforms::read(path, config.images.as_deref().unwrap_or(folder))?, Vec::new()),
+            None => read_with_points(&sparse)?,
+        };
+        if transforms.is_some() && config.more_points.is_none() {
+            points = transforms::points(&model, config.seed);
+            let count = points.len();
+            progress.warn(&format!("the dataset has no points: the training begins with {count} random ones"));
+        }
         if let Some(other) = &config.more_points {
             points.extend(more_points(&model, &sparse_folder(other))?);
         }
@@ -63,12 +73,26 @@ impl TrainData {
         let held = Vec::new();
         let mut data = Self { names, views, held_out: held, view_of, points, schedule, preset, masked, sparse, place };
         progress.begin("images", model.views.len());
+        // One for each lens, made where it is needed.
+        let mut undistortions: Vec<Option<Option<Undistortion>>> = vec![None; model.lenses.len()];
+        let mut left = Left { pixels: 0, kept: 0 };
         for view in &model.views {
             progress.check_cancelled()?;
             let path = images.join(&view.name);
             if path.is_file() {
                 data.view_of.push(Some(data.views.len()));
-                data.views.push(read_view(config, view, &model.lenses[view.lens], &path, masked)?);
+                let lens = &model.lenses[view.lens];
+                let undistortion = undistortions[view.lens].get_or_insert_with(|| Undistortion::new(lens)).as_ref();
+                let masks = config.masks.as_deref();
+                let (pixels, own) = picture::read(&path, view, lens, undistortion, masks)?;
+                if own.kept == 0 {
+                    return Err(TrainError::EmptyMask { name: view.name.clone() });
+                }
+                left = Left { pixels: left.pixels + own.pixels, kept: left.kept + own.kept };
+                let lens = undistortion.map_or(lens, |to| &to.lens);
+                let camera = pinhole(view, lens, config.shrink)
+                    .ok_or_else(|| TrainError::Lens { name: view.name.clone(), model: lens.model().name() })?;
+                data.views.push(read_view(config, &view.name, (camera, &pixels), undistortion, masked)?);
                 data.names.push(view.name.clone());
             } else {
                 data.view_of.push(None);
@@ -77,6 +101,9 @@ impl TrainData {
         }
         if data.views.is_empty() {
             return Err(TrainError::NoImages { cameras: model.views.len(), folder: images });
+        }
+        if config.masks.is_some() && left.kept == left.pixels {
+            progress.warn("the masks are 0 nowhere, so that they leave nothing out");
         }
         data.held_out = held_out(config, &data.names)?;
         let missing = model.views.len() - data.views.len();
@@ -89,24 +116,14 @@ impl TrainData {
 
 fn read_view(
     config: &TrainConfig,
-    view: &ColmapView,
-    lens: &Lens,
-    path: &Path,
+    name: &str,
+    (camera, pixels): (PinholeView, &Grid<[f32; 3]>),
+    undistortion: Option<&Undistortion>,
     masked: bool,
 ) -> Result<TrainingView<PinholeView>, TrainError> {
-    let camera = pinhole(view, lens, config.shrink)
-        .ok_or_else(|| TrainError::Lens { name: view.name.clone(), model: lens.model().name() })?;
-    let (full, size) = ([lens.width(), lens.height()], camera.size);
-    let source = ImageSource::open(path)?;
-    let pixels = source.read_colour(source.window())?;
-    let found = [pixels.width(), pixels.height()];
-    if found != full {
-        return Err(TrainError::Size { what: "the image", path: path.to_owned(), found, expected: full });
-    }
-    let brightest = pixels.data().iter().flatten().copied().fold(0.0f32, f32::max);
-    let white = if brightest > 255.0 { 65_535.0 } else { 255.0 };
-    let colour = [0, 1, 2].map(|c| shrunk(size, config.shrink, |x, y| pixels[(x, y)][c] / white));
-    let nested = Path::new(&view.name).with_extension("");
+    let (full, size) = ([pixels.width(), pixels.height()], camera.size);
+    let colour = [0, 1, 2].map(|c| shrunk(size, config.shrink, |x, y| pixels[(x, y)][c]));
+    let nested = Path::new(name).with_extension("");
     let flat = nested.file_name().unwrap_or_default();
     let map = |kind: &str, channels: usize| -> Result<Option<Vec<f32>>, TrainError> {
         // Maps for 2DGS leave out the folders of the name.
@@ -120,9 +137,11 @@ fn read_view(
     };
     let at = |x: usize, y: usize| y * full[0] + x;
     let half = config.shrink / 2;
+    // Maps are of the lens with its distortion, too.
+    let source = |pixel: usize| undistortion.map_or(Some(pixel), |to| to.nearest(pixel));
     let nearest = |of: &dyn Fn(usize) -> f32| -> Vec<f32> {
-        let pixel = |i: usize| of(at(i % size[0] * config.shrink + half, i / size[0] * config.shrink + half));
-        (0..size[0] * size[1]).map(pixel).collect()
+        let pixel = |i: usize| at(i % size[0] * config.shrink + half, i / size[0] * config.shrink + half);
+        (0..size[0] * size[1]).map(|i| source(pixel(i)).map_or(f32::NAN, of)).collect()
     };
     let finite = |v: f32| if v.is_finite() && v != 0.0 { v } else { f32::NAN };
     let wants = |kind| config.priors == TrainPriors::Both || config.priors == kind;

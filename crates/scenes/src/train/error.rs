@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use ::train::CheckpointDefect;
 use crs::CrsError;
+use io::camera_file::CameraFileError;
 use io::colmap::ColmapError;
 use io::npy::NpyError;
 use io::raster::RasterError;
@@ -25,6 +26,9 @@ pub enum TrainError {
     /// The cameras or points cannot be read.
     #[error(transparent)]
     Model(#[from] ColmapError),
+    /// The cameras of a transforms.json cannot be read.
+    #[error(transparent)]
+    Transforms(#[from] CameraFileError),
     /// A prior map cannot be read.
     #[error(transparent)]
     Map(#[from] NpyError),
@@ -71,8 +75,24 @@ pub enum TrainError {
         /// Columns and rows of the camera.
         expected: [usize; 2],
     },
-    /// A camera has a lens with distortion.
-    #[error("the lens of {name} has distortion ({model}), expected a pinhole: undistort the images first")]
+    /// A photograph has no mask.
+    #[error("{name} has no mask, expected {expected} in {}: give a mask for every image", folder.display())]
+    NoMask {
+        /// Name of the image.
+        name: String,
+        /// File names that were looked for.
+        expected: String,
+        /// The folder that was looked in.
+        folder: PathBuf,
+    },
+    /// A mask leaves nothing of a photograph.
+    #[error("the mask of {name} is 0 everywhere, so that nothing is left of it: masks are 0 where images do not count")]
+    EmptyMask {
+        /// Name of the image.
+        name: String,
+    },
+    /// A camera has a lens that cannot be laid over a pinhole.
+    #[error("the lens of {name} ({model}) cannot be laid over a pinhole: undistort the images first")]
     Lens {
         /// Name of the image.
         name: String,

@@ -23,6 +23,7 @@ mod held_out;
 mod initial;
 mod iterate;
 mod page;
+mod picture;
 mod place;
 mod recipe;
 mod report;
@@ -30,6 +31,7 @@ mod results;
 mod run;
 mod satellite;
 mod satellite_run;
+mod transforms;
 mod transients;
 
 pub(crate) use place::DatasetPlace;

@@ -51,7 +51,12 @@ impl DatasetPlace {
 pub(super) fn more_points(model: &ColmapModel, folder: &Path) -> Result<Vec<ColmapPoint>, TrainError> {
     let (other, points) = read_with_points(folder)?;
     let invalid = |what: String| TrainError::Dataset { path: folder.to_owned(), what };
-    let number_of = |view: &ColmapView| model.views.iter().position(|v| v.name == view.name);
+    // One of the two may name the folder, too. That a camera is the same, its pose says.
+    let within = |long: &str, short: &str| long.strip_suffix(short).is_some_and(|folder| folder.ends_with('/'));
+    let number_of = |view: &ColmapView| {
+        let exact = model.views.iter().position(|v| v.name == view.name);
+        exact.or_else(|| model.views.iter().position(|v| within(&v.name, &view.name) || within(&view.name, &v.name)))
+    };
     let numbers: Vec<Option<usize>> = other.views.iter().map(number_of).collect();
     let pairs: Vec<(&ColmapView, &ColmapView)> =
         other.views.iter().zip(&numbers).filter_map(|(view, n)| Some((view, &model.views[(*n)?]))).collect();

@@ -174,12 +174,6 @@ impl Lanes for Lanes256 {
     }
 
     #[inline(always)]
-    fn only_first(a: Mask256, b: Mask256) -> Mask256 {
-        // SAFETY: the masks were made from lanes of an `Avx2`, so the machine has the instruction.
-        Mask256(unsafe { _mm256_andnot_ps(b.0, a.0) })
-    }
-
-    #[inline(always)]
     fn or_else(self, mask: Mask256, other: Self) -> Self {
         // SAFETY: `self` was made from an `Avx2`, so the machine has the instruction.
         Self(unsafe { _mm256_blendv_ps(other.0, self.0, mask.0) })

@@ -137,11 +137,6 @@ impl Lanes for Lanes512 {
     }
 
     #[inline(always)]
-    fn only_first(a: __mmask16, b: __mmask16) -> __mmask16 {
-        a & !b
-    }
-
-    #[inline(always)]
     fn or_else(self, mask: __mmask16, other: Self) -> Self {
         // SAFETY: `self` was made from an `Avx512`, so the machine has the instruction.
         Self(unsafe { _mm512_mask_blend_ps(mask, other.0, self.0) })

@@ -78,7 +78,6 @@ mod tests {
                     a.max(b),
                     a.or_else(mask, b),
                     a.only(I::Lanes::both(mask, other)),
-                    a.only(I::Lanes::only_first(mask, other)),
                     exp2(isa, a.min(isa.splat(-0.25)).mul(isa.splat(9.0))),
                 ];
                 for (result, lanes) in results.iter_mut().zip(made) {

@@ -68,8 +68,6 @@ pub(crate) trait Lanes: Copy {
     /// Returns where `self ≤ other`; false where either is NaN.
     fn at_most(self, other: Self) -> Self::Mask;
     fn both(a: Self::Mask, b: Self::Mask) -> Self::Mask;
-    /// Returns where `a` holds and `b` does not.
-    fn only_first(a: Self::Mask, b: Self::Mask) -> Self::Mask;
     /// Takes `self` where the mask is set and `other` elsewhere.
     fn or_else(self, mask: Self::Mask, other: Self) -> Self;
     /// Takes `self` where the mask is set and 0 elsewhere.

@@ -16,4 +16,4 @@ mod plain;
 
 pub use dispatch::Registers;
 pub(crate) use dispatch::{dispatch, prefetch};
-pub(crate) use lanes::{Block, InstructionSet, Kernel, LANES, Lanes, exp2, total};
+pub(crate) use lanes::{Block, InstructionSet, Kernel, LANES, Lanes, exp2};

@@ -105,11 +105,6 @@ impl Lanes for PlainLanes {
     }
 
     #[inline(always)]
-    fn only_first(a: [bool; LANES], b: [bool; LANES]) -> [bool; LANES] {
-        std::array::from_fn(|i| a[i] && !b[i])
-    }
-
-    #[inline(always)]
     fn or_else(self, mask: [bool; LANES], other: Self) -> Self {
         Self(std::array::from_fn(|i| if mask[i] { self.0[i] } else { other.0[i] }))
     }

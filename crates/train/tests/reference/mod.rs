@@ -1,6 +1,6 @@
 //! A slow reference of the rasteriser in f64: every pixel meets every surfel, by plain geometry.
 //!
-//! Where the image jumps with the parameters (the cutoff, the change to the least footprint, the
+//! Where the image jumps with the parameters (the cutoff, the horizon of a plane, the
 //! greatest opacity, the order of depths), a pixel close to the jump is marked as unsure. Neither
 //! rounding nor differences can be judged there. So is a pixel at a surfel that is almost seen from
 //! the edge, where the rounding of the pixel to f32 moves the point of its plane too far.
@@ -89,13 +89,23 @@ fn project(eye: &Eye, p: [f64; 3]) -> ([f64; 2], f64) {
     }
 }
 
+/// Returns the move of the pixel with a move of a point.
+fn pixel_move(eye: &Eye, p: [f64; 3], by: [f64; 3]) -> [f64; 2] {
+    match *eye {
+        Eye::Pinhole { rotation, centre, focal, .. } => {
+            let (c, d) = (rotation.map(|a| dot(a, [0, 1, 2].map(|i| p[i] - centre[i]))), rotation.map(|a| dot(a, by)));
+            [0, 1].map(|i| focal[i] * (d[i] * c[2] - c[i] * d[2]) / (c[2] * c[2]))
+        }
+        Eye::Affine { jacobian, .. } => jacobian.map(|row| dot(row, by)),
+    }
+}
+
 /// Returns the splat at a pixel, and whether it is close to a jump.
 fn hit(eye: &Eye, surfel: &Parameters, pixel: [f64; 2]) -> (Option<Hit>, bool) {
     let p = surfel;
     let centre = [p[0], p[1], p[2]];
     let [tu, tv, n] = axes([p[3], p[4], p[5], p[6]]);
     let opacity = 1.0 / (1.0 + (-p[9]).exp());
-    let cutoff = 2.0 * (255.0 * opacity).ln();
     let (at, depth) = project(eye, centre);
     let perspective = matches!(eye, Eye::Pinhole { .. });
     if perspective && depth <= 0.1 {
@@ -116,36 +126,46 @@ fn hit(eye: &Eye, surfel: &Parameters, pixel: [f64; 2]) -> (Option<Hit>, bool) {
         (met, [dot(offset, tu) / p[7].exp(), dot(offset, tv) / p[8].exp()])
     };
     let (met, [u, v]) = meet(pixel);
-    let in_plane = u * u + v * v;
-    let in_image = 2.0 * ((pixel[0] - at[0]).powi(2) + (pixel[1] - at[1]).powi(2));
+    // The covariance in the image, blurred by a pixel.
+    let [ju, jv] = [(tu, p[7]), (tv, p[8])].map(|(axis, scale)| pixel_move(eye, centre, axis.map(|c| c * scale.exp())));
+    let own = (ju[0] * jv[1] - ju[1] * jv[0]).abs();
+    let [xx, xy, yy] = [(0, 0), (0, 1), (1, 1)].map(|(i, k)| ju[i] * ju[k] + jv[i] * jv[k]);
+    let (xx, yy) = (xx + 0.1, yy + 0.1);
+    let blurred = xx * yy - xy * xy;
+    let opacity = opacity * own / blurred.sqrt();
+    let cutoff = 2.0 * (255.0 * opacity).ln();
+    // A place in the plane, moved into the image by the derivatives, against that covariance.
+    let squared = |u: f64, v: f64| {
+        let [x, y] = [0, 1].map(|i| u * ju[i] + v * jv[i]);
+        (yy * x * x - 2.0 * xy * x * y + xx * y * y) / blurred
+    };
     let met_depth = project(eye, met).1;
     let ratio = if perspective { depth / met_depth } else { 1.0 };
-    let on_plane = in_plane <= in_image && ratio >= 0.05;
-    let rho = if on_plane { in_plane } else { in_image };
+    let rho = squared(u, v);
+    let is_drawn = rho <= cutoff && ratio >= 0.05;
     let alpha = opacity * (-rho / 2.0).exp();
     let rounded = || {
         (0..2).any(|i| {
             let mut beside = pixel;
             beside[i] += PIXEL_ROUNDING;
             let [u_beside, v_beside] = meet(beside).1;
-            (u_beside - u).hypot(v_beside - v) > TOO_FAR
+            squared(u_beside - u, v_beside - v).sqrt() > TOO_FAR
         })
     };
     let unsure = facing.abs() < 0.021
-        || rho <= cutoff + 0.1 && on_plane && rounded()
+        || rho <= cutoff + 0.1 && rounded()
         || (rho - cutoff).abs() < 1e-2
-        || rho <= cutoff + 0.1
-            && ((in_plane - in_image).abs() < 1e-2 || (ratio - 0.05).abs() < 1e-2 || (alpha - 0.99).abs() < 1e-3);
+        || rho <= cutoff + 0.1 && ((ratio - 0.05).abs() < 1e-2 || (alpha - 0.99).abs() < 1e-3);
     // A surfel has one normal in an image, turned by the line of sight to its centre.
     let turned = if facing > 0.0 { -1.0 } else { 1.0 };
     let hit = Hit {
         order: depth,
         alpha: alpha.min(0.99),
-        depth: if on_plane { met_depth } else { depth },
+        depth: met_depth,
         colour: [p[10], p[11], p[12]],
         normal: n.map(|c| c * turned),
     };
-    ((rho <= cutoff).then_some(hit), unsure)
+    (is_drawn.then_some(hit), unsure)
 }
 
 /// Draws surfels. The ninth image is the spread of depths, or of inverse depths of a pinhole.
