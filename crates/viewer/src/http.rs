@@ -78,7 +78,7 @@ pub(super) struct Answer {
     /// Type of the content.
     pub(super) kind: &'static str,
     /// The content.
-    pub(super) body: Vec<u8>,
+    pub(super) body: Bytes,
 }
 
 /// Why a request is not answered.
@@ -217,11 +217,11 @@ fn response(answer: Result<Answer, Refusal>, is_head: bool) -> Response<Full<Byt
                 Refusal::Malformed(text) | Refusal::Failed(text) => text,
                 _ => status.canonical_reason().unwrap_or_default().to_owned(),
             };
-            (status, "text/plain; charset=utf-8", text.into_bytes())
+            (status, "text/plain; charset=utf-8", Bytes::from(text))
         }
     };
     let length = body.len();
-    let mut response = Response::new(Full::new(Bytes::from(if is_head { Vec::new() } else { body })));
+    let mut response = Response::new(Full::new(if is_head { Bytes::new() } else { body }));
     *response.status_mut() = status;
     let fields = response.headers_mut();
     for (name, value) in FIELDS {
