@@ -99,8 +99,8 @@ mod tests {
             let q = raw.map(|c| c / length);
             let word = rotation(q.map(|c| c as f32));
             let largest = (word >> 30) as usize;
-            let three = [20, 10, 0]
-                .map(|shift| (f64::from(word >> shift & 1023) / 1023.0 - 0.5) * std::f64::consts::SQRT_2);
+            let three =
+                [20, 10, 0].map(|shift| (f64::from(word >> shift & 1023) / 1023.0 - 0.5) * std::f64::consts::SQRT_2);
             let rest = (1.0 - three.iter().map(|c| c * c).sum::<f64>()).sqrt();
             let back: [f64; 4] = std::array::from_fn(|i| match i {
                 _ if i == largest => rest,

@@ -173,8 +173,7 @@ impl Space {
 
     fn add(&mut self, path: &Path, kind: Kind, progress: &dyn Progress) -> Result<(), ViewError> {
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let too_large =
-            |what, found: u64, most: u64| ViewError::TooLarge { path: path.to_owned(), what, found, most };
+        let too_large = |what, found: u64, most: u64| ViewError::TooLarge { path: path.to_owned(), what, found, most };
         if kind == Kind::Mesh {
             let unreadable = |source| ViewError::Mesh { path: path.to_owned(), source };
             let length = std::fs::metadata(path).map_err(unreadable)?.len();

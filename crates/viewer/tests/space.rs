@@ -27,8 +27,8 @@ fn served<T>(inputs: &[PathBuf], work: impl FnOnce(&dyn Fn(&str) -> (u16, Vec<u8
         let status = String::from_utf8_lossy(&all[..end]).split(' ').nth(1).unwrap().parse().unwrap();
         (status, all.split_off(end + 4))
     };
+    let progress = Cancellable { inner: &Silent, flag: &flag };
     std::thread::scope(|scope| {
-        let progress = Cancellable { inner: &Silent, flag: &flag };
         let server = scope.spawn(|| viewer.serve(&progress).unwrap());
         let result = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| work(&get)));
         flag.cancel();
@@ -40,12 +40,12 @@ fn served<T>(inputs: &[PathBuf], work: impl FnOnce(&dyn Fn(&str) -> (u16, Vec<u8
 fn splats(origin: Option<LocalOrigin>) -> SplatFile {
     let splat = Splat {
         position: [1.0, -2.0, 30.5],
-        scale_m: [0.5, 0.25, 0.0],
+        scale_m: [0.5, 0.25, 2.5e-4],
         rotation: [0.5, -0.5, 0.5, 0.5],
         colour: [0.25, 0.5, 1.5],
         opacity: 0.75,
     };
-    let splats = vec![Splat { scale_m: [0.5, 0.25, 2.5e-4], ..splat }; 3];
+    let splats = vec![splat; 3];
     let harmonics = SplatHarmonics::new(1, (0..27).map(|i| i as f32 / 8.0).collect());
     SplatFile { splats, harmonics, layout: SplatLayout { form: SplatForm::Discs, sh_degree: 1 }, origin }
 }
@@ -63,7 +63,8 @@ fn folders(folder: &Path) -> [PathBuf; 2] {
     fs::write(training.join("points.ply"), b"ply\nformat ascii 1.0\nelement vertex 0\nend_header\n").unwrap();
     fs::write(training.join("report.json"), r#"{"views": [{"name": "b.png", "held_out": true}]}"#).unwrap();
     let lens = camera::Lens::new(60, 40, camera::LensModel::Pinhole, &[50.0, 51.0, 29.5, 19.5]).unwrap();
-    let pose = camera::Pose { rotation: [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]], centre: [5.0, 6.0, 7.0] };
+    let pose =
+        camera::Pose { rotation: [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]], centre: [5.0, 6.0, 7.0] };
     let view = |id, name: &str| ColmapView { id, name: name.to_owned(), lens: 0, pose };
     let model = ColmapModel { lenses: vec![lens], views: vec![view(1, "b.png"), view(2, "a.png")] };
     let sparse = dataset.join("sparse/0");
@@ -86,7 +87,10 @@ fn a_training_is_shown_with_its_cameras() {
         assert_eq!(scene["crs"], "EPSG:32631");
         assert_eq!((&scene["has_map"], scene["splats"].as_array().unwrap().len()), (&Value::Bool(false), 1));
         let layer = &scene["splats"][0];
-        assert_eq!((layer["count"].as_u64(), layer["degree"].as_u64(), layer["discs"].as_bool()), (Some(3), Some(1), Some(true)));
+        assert_eq!(
+            (layer["count"].as_u64(), layer["degree"].as_u64(), layer["discs"].as_bool()),
+            (Some(3), Some(1), Some(true))
+        );
         assert_eq!(scene["meshes"][0]["name"], "mesh.glb");
         let cameras = scene["cameras"].as_array().unwrap();
         assert_eq!(cameras.len(), 2);
@@ -107,7 +111,9 @@ fn a_training_is_shown_with_its_cameras() {
         assert_eq!((status, harmonics.len()), (200, 3 * 32));
         assert_eq!(harmonics[..6], [0, 0, 0x00, 0x36, 0x00, 0x3a]);
         assert_eq!(get("/meshes/0.glb").1, b"glTF and more");
-        for path in ["/splats/1.bin", "/splats/0", "/harmonics/9.bin", "/meshes/1.glb", "/meshes/..%2f.glb", "/splats/-1.bin"] {
+        for path in
+            ["/splats/1.bin", "/splats/0", "/harmonics/9.bin", "/meshes/1.glb", "/meshes/..%2f.glb", "/splats/-1.bin"]
+        {
             assert_eq!(get(path).0, 404, "{path}");
         }
     });
@@ -137,7 +143,11 @@ fn splats_lie_beside_a_map_and_files_of_other_maps_are_left_out() {
 fn damaged_and_missing_files_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let damaged = folder.path().join("splats.ply");
-    fs::write(&damaged, b"ply\nformat binary_little_endian 1.0\nelement vertex 5\nproperty float opacity\nend_header\n").unwrap();
+    fs::write(
+        &damaged,
+        b"ply\nformat binary_little_endian 1.0\nelement vertex 5\nproperty float opacity\nend_header\n",
+    )
+    .unwrap();
     let open = |path: PathBuf| ViewServer::open(&ViewConfig::new(vec![path]), &Silent);
     assert!(matches!(open(damaged), Err(ViewError::Splats(_))));
     // The damaged file of a folder is left out, and nothing else is there.

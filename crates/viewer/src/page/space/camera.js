@@ -54,9 +54,10 @@ export class Camera {
     }
     const { focal, principal, size } = this.shot;
     const scale = Math.min(width / size[0], height / size[1]);
+    // Cameras draw nothing nearer than 0.1, as in `train`.
     const margin = [(width - scale * size[0]) / 2, (height - scale * size[1]) / 2];
     return {
-      ...base, frame: [...margin, scale * size[0], scale * size[1]],
+      ...base, range: [0.1, far], frame: [...margin, scale * size[0], scale * size[1]],
       focal: focal.map((f) => f * scale), principal: principal.map((p, i) => (p + 0.5) * scale - 0.5 + margin[i]),
     };
   }

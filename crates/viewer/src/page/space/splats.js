@@ -34,7 +34,8 @@ vec3 shaded(vec3 constant, vec3 d) {
       - 0.4570457994644658 * d.x * (4.0 * s.z - s.x - s.y) * harmonic(12) + 1.445305721320277 * d.z * (s.x - s.y) * harmonic(13)
       - 0.5900435899266435 * d.x * (s.x - 3.0 * s.y) * harmonic(14);
   }
-  return max(sum, 0.0);
+  // Plain colours below 0 are as they are, as splats render has them.
+  return degree > 0 ? max(sum, 0.0) : sum;
 }`;
 
 const VERTEX = `#version 300 es
@@ -128,7 +129,8 @@ void main() {
   colour = vec4(shaded(vec3(rg, ba.x), normalize(sight)), ba.y);
   vec2 clip = 2.0 * (pixel + offset + 0.5) / size - 1.0;
   float depth = (range.y + range.x) / (range.y - range.x) - 2.0 * range.x * range.y / ((range.y - range.x) * centre.z);
-  gl_Position = vec4(clip.x, -clip.y, depth, 1.0);
+  // What lies beyond the range is drawn, too.
+  gl_Position = vec4(clip.x, -clip.y, min(depth, 1.0), 1.0);
 }`;
 
 const FRAGMENT = `#version 300 es
@@ -260,6 +262,7 @@ export class Splats {
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
     gl.depthMask(false);
+    gl.depthFunc(gl.LEQUAL);
     gl.bindVertexArray(this.vertices);
     gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, this.length);
     gl.bindVertexArray(null);
