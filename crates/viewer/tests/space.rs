@@ -16,7 +16,7 @@ use viewer::{ViewConfig, ViewError, ViewServer};
 /// Gets paths behind the token while a viewer is served.
 fn served<T>(inputs: &[PathBuf], work: impl FnOnce(&dyn Fn(&str) -> (u16, Vec<u8>)) -> T) -> T {
     let viewer = ViewServer::open(&ViewConfig::new(inputs.to_vec()), &Silent).unwrap();
-    let (url, flag) = (viewer.url(), CancelFlag::new());
+    let url = viewer.url();
     let (host, token) = url.strip_prefix("http://").unwrap().split_once('/').unwrap();
     let get = |path: &str| {
         let mut stream = TcpStream::connect(host).unwrap();
@@ -27,10 +27,16 @@ fn served<T>(inputs: &[PathBuf], work: impl FnOnce(&dyn Fn(&str) -> (u16, Vec<u8
         let status = String::from_utf8_lossy(&all[..end]).split(' ').nth(1).unwrap().parse().unwrap();
         (status, all.split_off(end + 4))
     };
+    answering(&viewer, || work(&get))
+}
+
+/// Serves a viewer while `work` is done.
+fn answering<T>(viewer: &ViewServer, work: impl FnOnce() -> T) -> T {
+    let flag = CancelFlag::new();
     let progress = Cancellable { inner: &Silent, flag: &flag };
     std::thread::scope(|scope| {
         let server = scope.spawn(|| viewer.serve(&progress).unwrap());
-        let result = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| work(&get)));
+        let result = std::panic::catch_unwind(std::panic::AssertUnwindSafe(work));
         flag.cancel();
         server.join().unwrap();
         result.unwrap_or_else(|panic| std::panic::resume_unwind(panic))
@@ -157,4 +163,46 @@ fn damaged_and_missing_files_are_refused() {
     fs::File::create(&large).unwrap().set_len((512 << 20) + 1).unwrap();
     let error = open(large).err().unwrap().to_string();
     assert!(error.contains("536870913 bytes of a mesh") && error.contains("536870912"), "{error}");
+}
+
+/// A Chromium on this machine: the one that the variable CHROMIUM names, else a usual name on the
+/// path.
+fn chromium() -> Option<PathBuf> {
+    let named = std::env::var_os("CHROMIUM").map(PathBuf::from);
+    let folders = std::env::var_os("PATH").unwrap_or_default();
+    let names = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"];
+    let usual = std::env::split_paths(&folders).flat_map(|folder| names.map(|name| folder.join(name)));
+    named.into_iter().chain(usual).find(|path| path.is_file())
+}
+
+#[test]
+fn a_browser_draws_splats_without_complaint() {
+    let Some(browser) = chromium() else {
+        testing::skip("Chromium is not installed (the variable CHROMIUM may name one)");
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("splats.spz");
+    io::splat_files::write(&path, &splats(Some(origin(690_000.0))), false).unwrap();
+    let viewer = ViewServer::open(&ViewConfig::new(vec![path]), &Silent).unwrap();
+    let shown = answering(&viewer, || {
+        let mut command = std::process::Command::new(browser);
+        command.args(["--headless", "--no-sandbox", "--disable-dev-shm-usage", "--enable-unsafe-swiftshader"]);
+        command.args([
+            "--enable-logging=stderr",
+            "--v=0",
+            "--timeout=60000",
+            "--virtual-time-budget=8000",
+            "--dump-dom",
+        ]);
+        command.arg(format!("--user-data-dir={}", folder.path().join("profile").display())).arg(viewer.url());
+        command.output().unwrap()
+    });
+    let (page, log) = (String::from_utf8_lossy(&shown.stdout), String::from_utf8_lossy(&shown.stderr));
+    // Drivers of WebGL tell of their speed in the same log.
+    let complaints: Vec<&str> =
+        log.lines().filter(|line| line.contains("CONSOLE") && !line.contains("GL Driver Message")).collect();
+    assert_eq!(complaints, [""; 0]);
+    assert!(page.contains("data-ready=\"true\"") && page.contains("data-drawn=\"all\""), "{page}");
+    assert!(page.contains("3 splats") && page.contains("EPSG:32631"), "{page}");
 }
