@@ -60,7 +60,7 @@ mod tests {
         let image = |noise: f32| {
             let value = |i: usize| {
                 let (x, y) = ((i % side) as f32, (i / side) as f32);
-                let sign = if (i % side + i / side) % 2 == 0 { 1.0 } else { -1.0 };
+                let sign = if (i % side + i / side).is_multiple_of(2) { 1.0 } else { -1.0 };
                 [0.5 + 0.3 * (x / 9.0).sin() * (y / 13.0).cos() + noise * sign; 3]
             };
             Grid::from_vec(side, side, (0..side * side).map(value).collect()).unwrap()
