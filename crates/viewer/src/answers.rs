@@ -22,14 +22,12 @@ use report::{MapStyle, png_with_alpha};
 use serde::Serialize;
 
 use super::files::{SPACE, file};
-use super::http::{Answer, Refusal};
+use super::http::{Answer, BINARY, Refusal};
 use super::query::{Query, whole};
 use super::scene::{SIDE_MAX, Scene, SceneLayer, SceneRaster, TILE, reduced};
 use super::space::Space;
 use job::error_text::with_causes;
 
-/// Type of numbers that the page reads.
-pub(super) const BINARY: &str = "application/octet-stream";
 /// Most samples of a profile.
 const SAMPLES_MAX: usize = 4000;
 /// Most rasters of a profile.

@@ -56,6 +56,9 @@ const FIELDS: [(&str, &str); 8] = [
     ("connection", "close"),
 ];
 
+/// Type of the numbers that pages read.
+pub(super) const BINARY: &str = "application/octet-stream";
+
 /// A request that may be answered.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Request {

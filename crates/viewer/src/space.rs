@@ -11,9 +11,8 @@ use numeric::Progress;
 use serde::Serialize;
 use serde_json::Value;
 
-use super::answers::BINARY;
 use super::error::ViewError;
-use super::http::Answer;
+use super::http::{Answer, BINARY};
 use super::packed;
 use super::query::whole;
 use super::rasters;
