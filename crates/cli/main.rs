@@ -98,7 +98,7 @@ enum Command {
     Template(production::TemplateArgs),
     /// Make training tiles around cameras: height map, ortho and cameras in one folder each.
     Tiles(Box<tiles::Args>),
-    /// Show a run or rasters in the browser: layers, profiles, 3D.
+    /// Show a run, rasters, splats or meshes in the browser: layers, profiles, 3D.
     View(view::Args),
 }
 

@@ -9,12 +9,13 @@ use crate::error::with_hint;
 use crate::progress::ShowOptions;
 use crate::{Global, Outcome, print};
 
-/// Show a run or rasters in the browser: layers, profiles, 3D.
+/// Show a run, rasters, splats or meshes in the browser: layers, profiles, 3D.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "The printed address works on this computer only, and only as a whole: it holds a secret. \
                         Ctrl-C ends the viewer. Example: skysweep view out --open")]
 pub(crate) struct Args {
-    /// Folders of runs, and rasters. The first raster sets the coordinate system of the map.
+    /// Folders of runs, trainings and datasets, rasters, splats (PLY, SPZ, SOG, GLB), meshes (GLB).
+    /// The first raster sets the coordinate system of the map.
     #[arg(required = true, value_name = "RUN|FILE")]
     inputs: Vec<PathBuf>,
     /// Port on 127.0.0.1 [default: a free one].

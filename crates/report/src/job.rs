@@ -4,6 +4,7 @@
 use raster::{Grid, VOID_COLOUR};
 use serde_json::Value;
 
+use crate::comparison::{self, Comparison};
 use crate::escape::escape;
 use crate::legend::Legend;
 use crate::links::{PageLink, section};
@@ -35,6 +36,8 @@ pub struct JobPage {
     pub layers: Vec<MapLayer>,
     /// Cells of the maps that are hatched, because their values were not observed.
     pub hatched: Option<Grid<bool>>,
+    /// Pictures against the truth.
+    pub comparisons: Vec<Comparison>,
     /// Plots with their titles and captions.
     pub plots: Vec<(Chart, String, String)>,
     /// Tables.
@@ -125,6 +128,7 @@ impl JobPage {
             if cards.is_empty() { String::new() } else { cards_of(&cards) },
             notes(&self.notes),
             self.maps()?,
+            comparison::section(&self.comparisons)?,
             section(&self.links),
             if plots.is_empty() { plots } else { format!("<h2>Plots</h2><div class=\"plots\">{plots}</div>") },
             self.tables.iter().map(JobTable::html).collect(),

@@ -16,6 +16,7 @@
 mod base64;
 mod batch;
 mod class;
+mod comparison;
 mod escape;
 mod evaluation;
 mod job;
@@ -35,6 +36,7 @@ mod words;
 
 pub use batch::{BatchAccuracy, BatchPage, BatchRow, BatchSceneRow};
 pub use class::class_title;
+pub use comparison::Comparison;
 pub use escape::escape;
 pub use evaluation::EvaluationReport;
 pub use job::{JobPage, JobTable, MapLayer};

@@ -28,6 +28,7 @@ mod facade;
 mod gaussian;
 mod graded;
 mod hits;
+mod multi_scale;
 mod overhang;
 mod pass;
 mod picture;
@@ -44,6 +45,7 @@ pub use camera::{AffineCamera, LensSplatCamera, MapSplatCamera, Projection, RayM
 pub use colour::{ColourFit, FitView, fit_colours};
 pub use division::{DivisionConfig, divide, uniform};
 pub use gaussian::{GaussianConfig, splat_of_block};
+pub use multi_scale::ms_ssim;
 pub use picture::{picture_splats, stretched};
 pub use quality::{HeightErrors, height_errors, psnr_db, ssim};
 pub use render::{Rendering, render};

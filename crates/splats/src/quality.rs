@@ -68,6 +68,11 @@ pub fn psnr_db(a: &Grid<[f32; 3]>, b: &Grid<[f32; 3]>, counts: &Grid<bool>) -> O
 /// Returns the structural similarity of two images in [0, 1], averaged over the pixels that count;
 /// `None` when none counts.
 pub fn ssim(a: &Grid<[f32; 3]>, b: &Grid<[f32; 3]>, counts: &Grid<bool>) -> Option<f64> {
+    similarity(a, b, counts).map(|(whole, _)| whole)
+}
+
+/// Returns the mean of the structural similarity, and of its part without the brightness.
+pub(super) fn similarity(a: &Grid<[f32; 3]>, b: &Grid<[f32; 3]>, counts: &Grid<bool>) -> Option<(f64, f64)> {
     let grey = |p: &[f32; 3]| p.iter().map(|c| f64::from(c.clamp(0.0, 1.0))).sum::<f64>() / 3.0;
     let zip = a.data().iter().zip(b.data()).zip(counts.data());
     let moments: Vec<[f64; 6]> = zip
@@ -78,14 +83,15 @@ pub fn ssim(a: &Grid<[f32; 3]>, b: &Grid<[f32; 3]>, counts: &Grid<bool>) -> Opti
         })
         .collect();
     let blurred = blur(&moments, a.width(), a.height());
-    let (mut sum, mut count) = (0.0, 0usize);
+    let (mut sum, mut structure, mut count) = (0.0, 0.0, 0usize);
     for (m, _) in blurred.iter().zip(&moments).filter(|(_, own)| own[0] > 0.0) {
         let [x, y, xx, yy, xy] = [1, 2, 3, 4, 5].map(|i| m[i] / m[0]);
         let (vx, vy, cov) = (xx - x * x, yy - y * y, xy - x * y);
         sum += (2.0 * x * y + C1) * (2.0 * cov + C2) / ((x * x + y * y + C1) * (vx + vy + C2));
+        structure += (2.0 * cov + C2) / (vx + vy + C2);
         count += 1;
     }
-    (count > 0).then(|| sum / count as f64)
+    (count > 0).then(|| (sum / count as f64, structure / count as f64))
 }
 
 fn blur(values: &[[f64; 6]], width: usize, height: usize) -> Vec<[f64; 6]> {

@@ -3,6 +3,9 @@
 //! | path | answer |
 //! |---|---|
 //! | `scene.json` | rasters, layers, legends |
+//! | `space.json` | splats, meshes, cameras |
+//! | `splats/NUMBER.bin`, `harmonics/NUMBER.bin` | splats as [`super::packed`] packs them |
+//! | `meshes/NUMBER.glb` | a mesh as it is |
 //! | `tile/LAYER/LEVEL/X/Y.png` | tile of a layer; a pixel of a level has 2^level cells |
 //! | `picture/LAYER.png?c&r&w&h&side` | window of a layer, at most `side` pixels wide and high |
 //! | `grid/RASTER?c&r&w&h&side` | the same of the first band of a raster, as numbers |
@@ -18,10 +21,11 @@ use raster::{Grid, Window};
 use report::{MapStyle, png_with_alpha};
 use serde::Serialize;
 
-use super::files::file;
-use super::http::{Answer, Refusal};
+use super::files::{SPACE, file};
+use super::http::{Answer, BINARY, Refusal};
 use super::query::{Query, whole};
 use super::scene::{SIDE_MAX, Scene, SceneLayer, SceneRaster, TILE, reduced};
+use super::space::Space;
 use job::error_text::with_causes;
 
 /// Most samples of a profile.
@@ -34,6 +38,7 @@ const PROFILE_CELLS: usize = 1 << 16;
 /// Answers requests with open rasters of its own. Each thread has one.
 pub(super) struct Answers<'a> {
     scene: &'a Scene,
+    space: &'a Space,
     /// Rasters that were used so far, by their numbers.
     open: Vec<Option<ImageSource>>,
 }
@@ -56,8 +61,8 @@ struct Profile {
 }
 
 impl<'a> Answers<'a> {
-    pub(super) fn new(scene: &'a Scene) -> Self {
-        Self { scene, open: scene.rasters.iter().map(|_| None).collect() }
+    pub(super) fn new(scene: &'a Scene, space: &'a Space) -> Self {
+        Self { scene, space, open: scene.rasters.iter().map(|_| None).collect() }
     }
 
     /// Answers the part of an address after the token.
@@ -65,13 +70,17 @@ impl<'a> Answers<'a> {
     /// # Errors
     /// [`Refusal::NotFound`], [`Refusal::Malformed`], [`Refusal::Failed`].
     pub(super) fn answer(&mut self, path: &str, query: &str) -> Result<Answer, Refusal> {
-        if let Some(answer) = file(path) {
+        // Without rasters, the page of splats is the only one.
+        let page = if path.is_empty() && self.scene.rasters.is_empty() { SPACE } else { path };
+        if let Some(answer) = file(page) {
             return Ok(answer);
         }
         let query = Query::new(query);
         let parts: Vec<&str> = path.splitn(6, '/').collect();
         match parts.as_slice() {
             ["scene.json"] => json(self.scene),
+            ["space.json"] => json(self.space),
+            [kind @ ("splats" | "harmonics" | "meshes"), name] => self.space.bytes(kind, name).ok_or(Refusal::NotFound),
             ["tile", layer, level, x, y] => self.tile(layer, level, x, y),
             ["picture", layer] => self.picture(layer, &query),
             ["grid", raster] => self.grid(raster, &query),
@@ -85,7 +94,7 @@ impl<'a> Answers<'a> {
     fn vectors(&self, number: &str) -> Result<Answer, Refusal> {
         let number = number.strip_suffix(".json").and_then(whole);
         let vectors = number.and_then(|number| self.scene.vectors.get(number)).ok_or(Refusal::NotFound)?;
-        Ok(Answer { kind: "application/json", body: vectors.features.clone() })
+        Ok(Answer { kind: "application/json", body: vectors.features.clone().into() })
     }
 
     fn tile(&mut self, layer: &str, level: &str, x: &str, y: &str) -> Result<Answer, Refusal> {
@@ -116,7 +125,7 @@ impl<'a> Answers<'a> {
         let mut body = Vec::with_capacity(8 + 4 * grid.data().len());
         [size.0, size.1].iter().for_each(|side| body.extend_from_slice(&(*side as u32).to_le_bytes()));
         grid.data().iter().for_each(|value| body.extend_from_slice(&value.to_le_bytes()));
-        Ok(Answer { kind: "application/octet-stream", body })
+        Ok(Answer { kind: BINARY, body: body.into() })
     }
 
     fn at(&mut self, query: &Query<'_>) -> Result<Answer, Refusal> {
@@ -286,12 +295,12 @@ fn together(cells: &[Option<(usize, usize)>], start: usize) -> (Option<Window>, 
 
 fn png(picture: &Grid<[u8; 4]>) -> Result<Answer, Refusal> {
     let body = png_with_alpha(picture).map_err(|error| Refusal::Failed(error.to_string()))?;
-    Ok(Answer { kind: "image/png", body })
+    Ok(Answer { kind: "image/png", body: body.into() })
 }
 
 fn json(value: &impl Serialize) -> Result<Answer, Refusal> {
     let body = serde_json::to_vec(value).map_err(|error| Refusal::Failed(error.to_string()))?;
-    Ok(Answer { kind: "application/json", body })
+    Ok(Answer { kind: "application/json", body: body.into() })
 }
 
 fn failed(error: RasterError) -> Refusal {

@@ -11,12 +11,13 @@ const SECONDS_MAX: f64 = 366.0 * 86_400.0;
 /// Most inputs.
 const INPUTS_MAX: usize = 32;
 
-/// An interactive viewer of runs and rasters.
+/// An interactive viewer of runs, rasters, splats and meshes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct ViewConfig {
-    /// Folders of runs, and rasters. The first raster found gives the coordinate system of the map.
+    /// Folders of runs, of trainings and of datasets, rasters, splats, meshes. The first raster found
+    /// gives the coordinate system of the map, the first origin that of splats and meshes.
     pub inputs: Vec<PathBuf>,
     /// Port on 127.0.0.1. `None` lets the system choose a free one.
     #[serde(default)]

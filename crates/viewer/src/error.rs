@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use io::areas::AreaError;
 use io::raster::RasterError;
+use io::splat_ply::SplatPlyError;
 
 use job::error::{JobError, SettingError, from_steps};
 
@@ -30,6 +31,32 @@ pub enum ViewError {
     NoRasters {
         /// The folder.
         path: PathBuf,
+    },
+    /// Splats cannot be read.
+    #[error(transparent)]
+    Splats(#[from] SplatPlyError),
+    /// A file of splats or a mesh is too large for a browser.
+    #[error(
+        "found {found} {what}, a browser can show {most}: make a smaller file (a budget of a training, a coarser mesh): {}",
+        path.display()
+    )]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// What it has.
+        what: &'static str,
+        /// How many it has.
+        found: u64,
+        /// How many may be shown.
+        most: u64,
+    },
+    /// A mesh cannot be read.
+    #[error("the mesh cannot be read: {}", path.display())]
+    Mesh {
+        /// The file.
+        path: PathBuf,
+        /// Reason given by the operating system.
+        source: std::io::Error,
     },
     /// One picture of a raster would take too long.
     #[error(

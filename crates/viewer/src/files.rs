@@ -1,10 +1,12 @@
 //! The files of the page, which are part of the program.
 
+use hyper::body::Bytes;
+
 use super::http::Answer;
 
 /// Files of the page by their names in the address: name, type, content.
-const FILES: [(&str, &str, &str); 9] = [
-    ("", "text/html; charset=utf-8", include_str!("page/index.html")),
+const FILES: [(&str, &str, &str); 16] = [
+    ("", HTML, include_str!("page/index.html")),
     ("style.css", "text/css; charset=utf-8", include_str!("page/style.css")),
     ("main.js", SCRIPT, include_str!("page/main.js")),
     ("map.js", SCRIPT, include_str!("page/map.js")),
@@ -13,11 +15,21 @@ const FILES: [(&str, &str, &str); 9] = [
     ("profile.js", SCRIPT, include_str!("page/profile.js")),
     ("surface.js", SCRIPT, include_str!("page/surface.js")),
     ("vectors.js", SCRIPT, include_str!("page/vectors.js")),
+    (SPACE, HTML, include_str!("page/space/index.html")),
+    ("space/space.css", "text/css; charset=utf-8", include_str!("page/space/space.css")),
+    ("space/main.js", SCRIPT, include_str!("page/space/main.js")),
+    ("space/camera.js", SCRIPT, include_str!("page/space/camera.js")),
+    ("space/splats.js", SCRIPT, include_str!("page/space/splats.js")),
+    ("space/sort.js", SCRIPT, include_str!("page/space/sort.js")),
+    ("space/mesh.js", SCRIPT, include_str!("page/space/mesh.js")),
 ];
 const SCRIPT: &str = "text/javascript; charset=utf-8";
+const HTML: &str = "text/html; charset=utf-8";
+/// Name of the page of splats and meshes.
+pub(super) const SPACE: &str = "space.html";
 
 /// Returns the file of a name.
 pub(super) fn file(name: &str) -> Option<Answer> {
     let (_, kind, content) = FILES.iter().find(|(own, ..)| *own == name)?;
-    Some(Answer { kind, body: content.as_bytes().to_vec() })
+    Some(Answer { kind, body: Bytes::from_static(content.as_bytes()) })
 }

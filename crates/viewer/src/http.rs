@@ -56,6 +56,9 @@ const FIELDS: [(&str, &str); 8] = [
     ("connection", "close"),
 ];
 
+/// Type of the numbers that pages read.
+pub(super) const BINARY: &str = "application/octet-stream";
+
 /// A request that may be answered.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Request {
@@ -78,7 +81,7 @@ pub(super) struct Answer {
     /// Type of the content.
     pub(super) kind: &'static str,
     /// The content.
-    pub(super) body: Vec<u8>,
+    pub(super) body: Bytes,
 }
 
 /// Why a request is not answered.
@@ -217,11 +220,11 @@ fn response(answer: Result<Answer, Refusal>, is_head: bool) -> Response<Full<Byt
                 Refusal::Malformed(text) | Refusal::Failed(text) => text,
                 _ => status.canonical_reason().unwrap_or_default().to_owned(),
             };
-            (status, "text/plain; charset=utf-8", text.into_bytes())
+            (status, "text/plain; charset=utf-8", Bytes::from(text))
         }
     };
     let length = body.len();
-    let mut response = Response::new(Full::new(Bytes::from(if is_head { Vec::new() } else { body })));
+    let mut response = Response::new(Full::new(if is_head { Bytes::new() } else { body }));
     *response.status_mut() = status;
     let fields = response.headers_mut();
     for (name, value) in FIELDS {

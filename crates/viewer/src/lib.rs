@@ -1,4 +1,5 @@
-//! The view job: an interactive viewer of a run, or of rasters, for the browser of this computer.
+//! The view job: an interactive viewer of a run, of rasters, or of splats and meshes, for the browser
+//! of this computer.
 //!
 //! [`ViewServer::open`] finds the layers and takes a port, [`ViewServer::serve`] answers until it
 //! is cancelled or its time is over. The server is read-only and meant for one person:
@@ -22,11 +23,13 @@ mod config;
 mod error;
 mod files;
 mod http;
+mod packed;
 mod query;
 mod rasters;
 mod report;
 mod scene;
 mod server;
+mod space;
 mod styles;
 mod vectors;
 

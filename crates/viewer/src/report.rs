@@ -6,7 +6,7 @@ use serde::Serialize;
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct ViewerReport {
-    /// Names of the layers.
+    /// Names of the layers, and of splats and meshes.
     pub layers: Vec<String>,
     /// Requests that were answered.
     pub answered: u64,

@@ -50,6 +50,8 @@ pub(super) struct Scene {
     pub(super) vectors: Vec<SceneVectors>,
     /// Number of folders among the inputs: two are shown side by side.
     folders: usize,
+    /// Whether there are splats or meshes, which have a page of their own.
+    pub(super) has_space: bool,
     /// Side of a tile, pixels.
     tile: usize,
     /// Version of the program.
@@ -119,6 +121,33 @@ pub(super) struct SceneLayer {
 }
 
 impl Scene {
+    /// A scene without rasters.
+    pub(super) fn empty() -> Self {
+        Self::of(MapSystem {
+            name: "no coordinate system".to_owned(),
+            vertical: None,
+            unit: "px",
+            metres: (1.0, 1.0),
+            wkt: None,
+            epsg: None,
+            is_placed: false,
+        })
+    }
+
+    /// A scene of a map without anything on it.
+    fn of(map: MapSystem) -> Self {
+        Self {
+            map,
+            rasters: Vec::new(),
+            layers: Vec::new(),
+            vectors: Vec::new(),
+            folders: 0,
+            has_space: false,
+            tile: TILE,
+            version: env!("CARGO_PKG_VERSION"),
+        }
+    }
+
     /// Opens the rasters of the inputs and chooses how they are drawn.
     ///
     /// # Errors
@@ -213,16 +242,7 @@ fn add(
     let sample: Vec<Grid<f32>> =
         bands.iter().map(|&band| source.read_reduced(band, source.window(), size)).collect::<Result<_, _>>()?;
     let looks = looks(&RasterTraits { stem: &file.stem, info, label: &label, sample: &sample });
-    let new = Scene {
-        map,
-        rasters: Vec::new(),
-        layers: Vec::new(),
-        vectors: Vec::new(),
-        folders: 0,
-        tile: TILE,
-        version: env!("CARGO_PKG_VERSION"),
-    };
-    let scene = scene.get_or_insert(new);
+    let scene = scene.get_or_insert_with(|| Scene::of(map));
     let index = scene.rasters.len();
     let is_height = looks.iter().any(|look| look.is_height);
     let placed = laid.as_ref().map_or(info, ImageSource::info);

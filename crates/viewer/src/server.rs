@@ -17,6 +17,7 @@ use super::error::ViewError;
 use super::http::{Answer, Question, Refusal, Request, serve};
 use super::report::ViewerReport;
 use super::scene::Scene;
+use super::space::Space;
 
 /// Requests that are answered at once. A browser asks six at a time.
 const WORKERS: usize = 6;
@@ -26,6 +27,7 @@ const TOKEN_BYTES: usize = 16;
 /// A viewer that listens and is not served yet.
 pub struct ViewServer {
     scene: Scene,
+    space: Space,
     listener: TcpListener,
     address: SocketAddr,
     token: String,
@@ -47,7 +49,10 @@ impl ViewServer {
     /// [`ViewError`]: a setting out of range, rasters that cannot be read, a port that is taken.
     pub fn open(config: &ViewConfig, progress: &dyn Progress) -> Result<Self, ViewError> {
         config.validate()?;
-        let scene = Scene::open(config, progress)?;
+        let mut space = Space::open(&config.inputs, progress)?;
+        let rasters = ViewConfig { inputs: space.others(&config.inputs), ..config.clone() };
+        let mut scene = if rasters.inputs.is_empty() { Scene::empty() } else { Scene::open(&rasters, progress)? };
+        (space.has_map, scene.has_space) = (!scene.rasters.is_empty(), !space.is_empty());
         let mut bytes = [0u8; TOKEN_BYTES];
         getrandom::fill(&mut bytes).map_err(|error| ViewError::Token { reason: error.to_string() })?;
         let token = bytes.iter().fold(String::new(), |mut token, byte| {
@@ -59,7 +64,7 @@ impl ViewServer {
         let taken = |source| ViewError::Port { port, source };
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port)).map_err(taken)?;
         let address = listener.local_addr().map_err(taken)?;
-        Ok(Self { scene, listener, address, token, seconds: config.seconds })
+        Ok(Self { scene, space, listener, address, token, seconds: config.seconds })
     }
 
     /// Returns the address of the page, with the token.
@@ -107,7 +112,7 @@ impl ViewServer {
         served.map_err(ViewError::Thread)?;
         let count = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
         Ok(ViewerReport {
-            layers: self.scene.layers.iter().map(|layer| layer.title.clone()).collect(),
+            layers: self.scene.layers.iter().map(|layer| layer.title.clone()).chain(self.space.names()).collect(),
             answered: count(&counts.answered),
             refused: count(&counts.refused),
             failed: count(&counts.failed),
@@ -117,7 +122,7 @@ impl ViewServer {
 
     /// Answers one request after the other until no more can come.
     fn work(&self, questions: &Mutex<mpsc::UnboundedReceiver<Question>>, counts: &Counts) {
-        let mut answers = Answers::new(&self.scene);
+        let mut answers = Answers::new(&self.scene, &self.space);
         let next = || questions.lock().unwrap_or_else(PoisonError::into_inner).blocking_recv();
         while let Some(question) = next() {
             let request = question.request.clone();

@@ -4712,6 +4712,9 @@ class TrainedViewRow(Report):
     ssim: float | None
     """Structural similarity."""
 
+    ms_ssim: float | None
+    """Structural similarity over five scales; none of images with a side below 176 pixels."""
+
     psnr_right_db: float | None
     """Signal-to-noise ratio over the right half of a photograph that was held out, dB."""
 

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use raster::Grid;
-use report::{Axis, Chart, JobPage, MapLayer};
+use report::{Axis, Chart, Comparison, JobPage};
 use serde::Serialize;
 
 use super::report::LossPoint;
@@ -12,8 +12,9 @@ use job::report_page;
 
 /// Longest side of a view on the page, pixels.
 const SIDE_MAX: usize = 640;
-/// Columns between the two pictures.
-const GAP: usize = 8;
+/// Most views with pictures on the page, each of which has about two megabytes. The folder of the
+/// renderings has all.
+const VIEWS_MAX: usize = 24;
 
 /// Writes a report and its page.
 pub(super) fn write(
@@ -21,11 +22,16 @@ pub(super) fn write(
     lead: &str,
     report: &impl Serialize,
     losses: &[LossPoint],
-    layers: Vec<MapLayer>,
+    mut comparisons: Vec<Comparison>,
     overwrite: bool,
 ) -> Result<(), FileError> {
     let value = serde_json::to_value(report)?;
-    let page = JobPage { layers, plots: plots(losses), ..JobPage::of_report("Training", lead, &value) };
+    let mut page = JobPage { plots: plots(losses), ..JobPage::of_report("Training", lead, &value) };
+    if comparisons.len() > VIEWS_MAX {
+        page.notes.push(format!("{VIEWS_MAX} of {} held-out views have their pictures here.", comparisons.len()));
+        comparisons.truncate(VIEWS_MAX);
+    }
+    page.comparisons = comparisons;
     report_page::write_page(path, &page, report, overwrite)
 }
 
@@ -51,13 +57,24 @@ fn plots(losses: &[LossPoint]) -> Vec<(Chart, String, String)> {
     ]
 }
 
-/// Returns a map of the page from a picture of [`beside`].
-pub(super) fn layer(name: &str, picture: Grid<[u8; 3]>) -> MapLayer {
-    MapLayer {
+/// Returns what the page shows of a view that was not trained on.
+pub(super) fn comparison(
+    name: &str,
+    truth: &Grid<[f32; 3]>,
+    shown: &Grid<[f32; 3]>,
+    (psnr_db, ssim, ms_ssim): (Option<f64>, Option<f64>, Option<f64>),
+) -> Comparison {
+    let number = |value: Option<f64>, digits: usize| value.map_or("none".to_owned(), |v| format!("{v:.digits$}"));
+    Comparison {
         name: name.to_owned(),
-        picture,
-        caption: "The image on the left, the splats on the right; this view was not trained on.".to_owned(),
-        legend: None,
+        truth: thinned(truth),
+        shown: thinned(shown),
+        caption: format!(
+            "This view was not trained on: PSNR {} dB, SSIM {}, MS-SSIM {}.",
+            number(psnr_db, 2),
+            number(ssim, 3),
+            number(ms_ssim, 3)
+        ),
     }
 }
 
@@ -66,17 +83,11 @@ pub(super) fn bytes(picture: &Grid<[f32; 3]>) -> Grid<[u8; 3]> {
     picture.map(|p| p.map(|c| if c.is_finite() { (255.0 * c.clamp(0.0, 1.0)).round() as u8 } else { 0 }))
 }
 
-/// Returns two pictures of one size side by side, thinned to the size of the page.
-pub(super) fn beside(left: &Grid<[f32; 3]>, right: &Grid<[f32; 3]>) -> Grid<[u8; 3]> {
-    let step = left.width().max(left.height()).div_ceil(SIDE_MAX).max(1);
-    let (width, height) = (left.width().div_ceil(step), left.height().div_ceil(step));
-    let mut out = Grid::filled(2 * width + GAP, height, [255u8; 3]);
-    for (start, picture) in [(0, bytes(left)), (width + GAP, bytes(right))] {
-        for y in 0..height {
-            for x in 0..width {
-                out[(start + x, y)] = picture[(x * step, y * step)];
-            }
-        }
-    }
-    out
+/// Returns a picture thinned to the size of the page.
+fn thinned(picture: &Grid<[f32; 3]>) -> Grid<[u8; 3]> {
+    let step = picture.width().max(picture.height()).div_ceil(SIDE_MAX).max(1);
+    let (width, height) = (picture.width().div_ceil(step), picture.height().div_ceil(step));
+    let picture = bytes(picture);
+    let pixels = (0..width * height).map(|i| picture[(i % width * step, i / width * step)]).collect();
+    Grid::from_vec(width, height, pixels).expect("as many values as pixels")
 }

@@ -54,6 +54,8 @@ pub struct TrainedViewRow {
     pub ssim_before: Option<f64>,
     /// Structural similarity.
     pub ssim: Option<f64>,
+    /// Structural similarity over five scales; none of images with a side below 176 pixels.
+    pub ms_ssim: Option<f64>,
     /// Signal-to-noise ratio over the right half of a photograph that was held out, dB.
     pub psnr_right_db: Option<f64>,
     /// The same after the gains and the offsets that bring its left half to the truth, dB: a
@@ -76,9 +78,14 @@ impl TrainedViewRow {
             psnr_db: after.0,
             ssim_before: before.1,
             ssim: after.1,
+            ms_ssim: None,
             psnr_right_db: None,
             psnr_right_exposed_db: None,
         }
+    }
+
+    pub(super) fn with_ms_ssim(self, ms_ssim: Option<f64>) -> Self {
+        Self { ms_ssim, ..self }
     }
 
     pub(super) fn with_right(self, (plain, exposed): Exposed) -> Self {

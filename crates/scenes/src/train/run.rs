@@ -6,8 +6,8 @@ use ::train::{Drawing, PinholeView, Registers, TrainingConfig, TrainingState, Tr
 use io::raster::write_png_rgb;
 use numeric::Progress;
 use raster::Grid;
-use report::MapLayer;
-use splats::{psnr_db, ssim};
+use report::Comparison;
+use splats::{ms_ssim, psnr_db, ssim};
 
 use super::config::{PriorSchedule, TrainConfig};
 use super::course::{Course, Trained};
@@ -68,11 +68,11 @@ fn train(
     let Trained { state, transient_share, losses, seconds } = course.run(&initial, views, progress)?;
     results::begin(folder)?;
     let renders = Renders { folder: &folder.subfolder(RENDERS)?, may_replace };
-    let Judged { views: after, right, layers } = quality(data, &state, Some(renders))?;
+    let Judged { views: after, right, comparisons, ms_ssim } = quality(data, &state, Some(renders))?;
     let splats = results::write_splats(&config.output, &state, &data.place.origin, may_replace)?;
     let row = |v: usize| {
         let row = TrainedViewRow::new(&data.names[v], data.held_out[v], before[v], after[v]);
-        row.with_right(right[v])
+        row.with_right(right[v]).with_ms_ssim(ms_ssim[v])
     };
     let report = TrainReport {
         settings: config.clone(),
@@ -90,7 +90,7 @@ fn train(
         losses,
     };
     let lead = "Flat Gaussian splats that learned from the images of a dataset.";
-    page::write(&config.output.join(REPORT), lead, &report, &report.losses, layers, may_replace)?;
+    page::write(&config.output.join(REPORT), lead, &report, &report.losses, comparisons, may_replace)?;
     files::remove(&config.output.join(CHECKPOINT))?;
     Ok(report)
 }
@@ -117,19 +117,22 @@ struct Renders<'a> {
 }
 
 /// How well the views are shown, and what shows it.
+#[derive(Default)]
 struct Judged {
     /// By view.
     views: Vec<Quality>,
     /// Of the right half, by view; none for views that were trained on.
     right: Vec<Exposed>,
     /// Views that were not trained on, for the page.
-    layers: Vec<MapLayer>,
+    comparisons: Vec<Comparison>,
+    /// Similarity over several scales, by view; only where views are written.
+    ms_ssim: Vec<Option<f64>>,
 }
 
 /// Returns the quality of every view, and of the right halves of those that were not trained on.
 /// Writes what these show, and returns them for the page.
 fn quality(data: &TrainData, state: &TrainingState, write: Option<Renders<'_>>) -> Result<Judged, TrainError> {
-    let mut out = Judged { views: Vec::with_capacity(data.views.len()), right: Vec::new(), layers: Vec::new() };
+    let mut out = Judged::default();
     let mut coloured = Vec::new();
     let mut drawing = Drawing::new(&[], &data.views[0].camera, Registers::Longest);
     for (number, view) in data.views.iter().enumerate() {
@@ -145,13 +148,16 @@ fn quality(data: &TrainData, state: &TrainingState, write: Option<Renders<'_>>) 
         if let Some(mask) = &view.mask {
             counts.data_mut().copy_from_slice(mask);
         }
-        out.views.push((psnr_db(&found, &truth, &counts), ssim(&found, &truth, &counts)));
+        let (psnr, similar) = (psnr_db(&found, &truth, &counts), ssim(&found, &truth, &counts));
+        out.views.push((psnr, similar));
+        let several = write.as_ref().and_then(|_| ms_ssim(&found, &truth, &counts));
+        out.ms_ssim.push(several);
         out.right.push(if data.held_out[number] { right_half(&found, &truth, &counts) } else { (None, None) });
         if let Some(renders) = write.as_ref().filter(|_| data.held_out[number]) {
             let stem = Path::new(&data.names[number]).file_stem().unwrap_or_default().to_string_lossy();
             let path = renders.folder.join(format!("{stem}.png"));
             write_png_rgb(path, &page::bytes(&found), renders.may_replace)?;
-            out.layers.push(page::layer(&data.names[number], page::beside(&truth, &found)));
+            out.comparisons.push(page::comparison(&data.names[number], &truth, &found, (psnr, similar, several)));
         }
     }
     Ok(out)

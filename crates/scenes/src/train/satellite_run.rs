@@ -8,7 +8,7 @@ use io::raster::{Band, BandData, CogRaster, read_dem, write_cog, write_png_rgb};
 use numeric::Progress;
 use raster::Grid;
 use serde::{Deserialize, Serialize};
-use splats::{psnr_db, ssim};
+use splats::{ms_ssim, psnr_db, ssim};
 
 use super::course::{Course, Trained};
 use super::error::TrainError;
@@ -243,17 +243,19 @@ fn train(
         Some(surface) => heights(&folder, &placed, [&placed.surfels, &state.surfels], surface, may_replace)?,
         None => None,
     };
-    let (mut views, mut layers) = (Vec::new(), Vec::new());
+    let (mut views, mut comparisons) = (Vec::new(), Vec::new());
     for (number, (image, before)) in pictures.iter().zip(before).enumerate() {
         let (after, shown) = quality(&state, &image.view);
         let held_out = number >= config.images.len();
+        let mut several = None;
         if held_out {
-            let picture = page::beside(&truth(&image.view), &shown);
+            let picture = truth(&image.view);
+            several = ms_ssim(&shown, &picture, &picture.map(|p| p.iter().all(|c| c.is_finite())));
             let file = folder.subfolder(RENDERS)?.join(Path::new(&image.name).with_extension("png"));
             write_png_rgb(file, &page::bytes(&shown), may_replace)?;
-            layers.push(page::layer(&image.name, picture));
+            comparisons.push(page::comparison(&image.name, &picture, &shown, (after.0, after.1, several)));
         }
-        views.push(TrainedViewRow::new(&image.name, held_out, before, after));
+        views.push(TrainedViewRow::new(&image.name, held_out, before, after).with_ms_ssim(several));
     }
     let report = SatelliteTrainReport {
         settings: config.clone(),
@@ -268,7 +270,7 @@ fn train(
         losses,
     };
     let lead = "Splats that learned from satellite images.";
-    page::write(&config.output.join(REPORT), lead, &report, &report.losses, layers, may_replace)?;
+    page::write(&config.output.join(REPORT), lead, &report, &report.losses, comparisons, may_replace)?;
     files::remove(&config.output.join(CHECKPOINT))?;
     Ok(report)
 }

@@ -24,6 +24,7 @@ let tool = null;
 // Layers.
 
 $("system").textContent = [scene.map.name, scene.map.vertical && `heights: ${scene.map.vertical}`].filter(Boolean).join(" · ");
+$("to-space").hidden = !scene.has_space;
 document.title = `${scene.rasters[0].file} – skysweep view`;
 for (const i of plain) {
   const label = document.createElement("label");
