@@ -16,8 +16,8 @@ const INPUTS_MAX: usize = 32;
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct ViewConfig {
-    /// Folders of runs, of trainings and of datasets, rasters, splats, meshes. The first raster found
-    /// gives the coordinate system of the map, the first origin that of splats and meshes.
+    /// Folders of runs, of trainings and of datasets, rasters, splats, meshes. The first raster
+    /// found gives the coordinate system of the map, the first origin that of splats and meshes.
     pub inputs: Vec<PathBuf>,
     /// Port on 127.0.0.1. `None` lets the system choose a free one.
     #[serde(default)]

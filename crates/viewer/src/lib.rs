@@ -1,5 +1,5 @@
-//! The view job: an interactive viewer of a run, of rasters, or of splats and meshes, for the browser
-//! of this computer.
+//! The view job: an interactive viewer of a run, of rasters, or of splats and meshes, for the
+//! browser of this computer.
 //!
 //! [`ViewServer::open`] finds the layers and takes a port, [`ViewServer::serve`] answers until it
 //! is cancelled or its time is over. The server is read-only and meant for one person:
