@@ -967,7 +967,7 @@ def dtm(
     """Find the bare ground under a surface model, and the heights above it.
 
     Args:
-        surface: Surface model on a projected map, or the folder of a DSM run.
+        surface: Surface model on a map with square cells, or the folder of a DSM run.
         output: Folder for the rasters and the report.
         surface_vertical: Vertical datum of the surface model, where the file names none or a wrong
             one. The heights are not converted.
@@ -1010,7 +1010,7 @@ def classes(
     """Find ground, buildings and vegetation of a surface model.
 
     Args:
-        surface: Surface model on a projected map, or the folder of a DSM run.
+        surface: Surface model on a map with square cells, or the folder of a DSM run.
         output: Folder for the rasters and the report.
         vegetation_index: Vegetation index (NDVI, −1 to 1) on any grid, which overrules the
             roughness.
@@ -1060,8 +1060,8 @@ def buildings(
     Args:
         image: The image.
         output: GeoTIFF to write; the report is written beside it.
-        surface: Surface model on a projected map, or the folder of a DSM run, on which the index is
-            laid. `None` leaves it in the pixels of the image.
+        surface: Surface model on a map, or the folder of a DSM run, on which the index is laid.
+            `None` leaves it in the pixels of the image.
         surface_vertical: Vertical datum of the surface model, where the file names none or a wrong
             one.
         corrections: Where the pointing correction of the image comes from, on a surface model.
@@ -1218,7 +1218,7 @@ def ortho(
 
     Args:
         images: Images with RPCs, at most 255.
-        surface: Surface model on a projected map, or the folder of a DSM run.
+        surface: Surface model on a map, or the folder of a DSM run.
         output: GeoTIFF to write; the mask is written beside it.
         cell_m: Cell size, metres. `None` takes the grid of the surface model.
         bounds: Area on the map of the surface model: x_min, y_min, x_max, y_max. `None` takes all
