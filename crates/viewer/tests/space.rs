@@ -77,7 +77,7 @@ fn folders(folder: &Path) -> [PathBuf; 2] {
     let sparse = dataset.join("sparse/0");
     fs::create_dir_all(&sparse).unwrap();
     io::colmap::write(&sparse, &model, &[], ColmapEncoding::Text, false).unwrap();
-    fs::write(dataset.join("origin.json"), serde_json::to_string(&origin(690_010.0)).unwrap()).unwrap();
+    fs::write(sparse.join("origin.json"), serde_json::to_string(&origin(690_010.0)).unwrap()).unwrap();
     [training, dataset]
 }
 
