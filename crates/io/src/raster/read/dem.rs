@@ -45,7 +45,7 @@ pub struct Dem {
 }
 
 impl Dem {
-    /// Returns the side lengths of a cell along columns and rows, metres, in the middle of the grid.
+    /// Returns the side lengths of a cell along columns and rows in the middle of the grid, metres.
     /// `projection` is that of the grid.
     pub fn cell_size_m(&self, projection: &MapProjection) -> (f64, f64) {
         let (column, row) = (0.5 * self.heights.width() as f64, 0.5 * self.heights.height() as f64);
