@@ -113,7 +113,7 @@ mod tests {
 
     #[test]
     fn errors_are_black_where_there_are_none_and_lightest_from_an_eighth_on() {
-        let truth = Grid::from_vec(3, 1, vec![[100u8; 3], [100; 3], [0, 0, 96]]).unwrap();
+        let truth = Grid::from_vec(3, 1, vec![[100u8; 3], [100; 3], [0, 0, 48]]).unwrap();
         let shown = Grid::from_vec(3, 1, vec![[100u8; 3], [164; 3], [0, 0, 0]]).unwrap();
         let one = Comparison { name: "a <b>".to_owned(), truth, shown, caption: "22 dB".to_owned() };
         let errors = one.errors();
