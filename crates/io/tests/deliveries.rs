@@ -106,7 +106,9 @@ fn tiles_of_worldview_are_one_image() {
 /// in `RPC_NAME.XML` and counts pixels from 1, or from 0 for Pléiades Neo.
 #[test]
 fn tiles_of_pleiades_are_one_image() {
-    for (profile, first) in [("PHR_SENSOR", 1.0), ("PNEO_SENSOR", 0.0)] {
+    for (profile, first, domain) in
+        [("PHR_SENSOR", 1.0, "Direct_Model_Validity_Domain"), ("PNEO_SENSOR", 0.0, "ImagetoGround_Validity_Domain")]
+    {
         let folder = TempDir::new().unwrap();
         let name = "PNEO3_202401010000000_PAN_SEN_PWOI_000000000_1_1_F_1";
         let at = |file: String| folder.path().join(file);
@@ -139,15 +141,19 @@ fn tiles_of_pleiades_are_one_image() {
             TILE[0]
         );
         std::fs::write(at(format!("DIM_{name}.XML")), dim).unwrap();
-        std::fs::write(at(format!("RPC_{name}.XML")), dimap_rpc(&rpc, &head, first)).unwrap();
+        std::fs::write(at(format!("RPC_{name}.XML")), dimap_rpc(&rpc, &head, first, domain)).unwrap();
         is_the_town(&at(format!("DIM_{name}.XML")));
         // The first tile alone begins where the image begins, so the RPC is its own.
         is_the_camera(&read_for_image(&at(format!("IMG_{name}_R1C1.TIF"))).unwrap().rpc, &rpc);
+        // Another tile has it moved to its own first pixel.
+        let mut moved = rpc.clone();
+        moved.samp_off -= TILE[0] as f64;
+        is_the_camera(&read_for_image(&at(format!("IMG_{name}_R1C2.TIF"))).unwrap().rpc, &moved);
     }
 }
 
-/// Writes an RPC as DIMAP does; `first` is the number of the first pixel.
-fn dimap_rpc(rpc: &Rpc, head: &str, first: f64) -> String {
+/// Writes an RPC as DIMAP does; `first` is the number of the first pixel, in the element `domain`.
+fn dimap_rpc(rpc: &Rpc, head: &str, first: f64, domain: &str) -> String {
     let mut values = String::new();
     for (name, poly) in [
         ("SAMP_NUM", &rpc.samp_num),
@@ -174,8 +180,8 @@ fn dimap_rpc(rpc: &Rpc, head: &str, first: f64) -> String {
     let validity: String = scalars.iter().map(|(name, value)| format!("<{name}>{value}</{name}>")).collect();
     format!(
         "<?xml version=\"1.0\"?><Dimap_Document>{head}<Rational_Function_Model><Global_RFM><Inverse_Model>{values}\
-         </Inverse_Model><RFM_Validity><Direct_Model_Validity_Domain><FIRST_ROW>{first}</FIRST_ROW>\
-         <FIRST_COL>{first}</FIRST_COL></Direct_Model_Validity_Domain>{validity}</RFM_Validity></Global_RFM>\
+         </Inverse_Model><RFM_Validity><{domain}><FIRST_ROW>{first}</FIRST_ROW>\
+         <FIRST_COL>{first}</FIRST_COL></{domain}>{validity}</RFM_Validity></Global_RFM>\
          </Rational_Function_Model></Dimap_Document>"
     )
 }

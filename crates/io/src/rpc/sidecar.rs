@@ -94,7 +94,12 @@ fn rank(stem: &str, full: &str, name: &str) -> Option<usize> {
 /// Whether a file has the name of the first tile of a DIMAP product, `IMG_X_R1C1`.
 pub(super) fn is_first_tile(image: &Path) -> bool {
     let stem = image.file_stem().unwrap_or_default().to_string_lossy().to_lowercase();
-    stem.starts_with("img_") && stem.ends_with("_r1c1")
+    product_of_first_tile(&stem).is_some()
+}
+
+/// Returns X of `img_x_r1c1`.
+fn product_of_first_tile(stem: &str) -> Option<&str> {
+    stem.strip_prefix("img_")?.strip_suffix("_r1c1")
 }
 
 /// Ranks DIMAP names: `rpc_X.xml` fits `dim_X`, which stands for all tiles, and `img_X_r1c1`, also
@@ -102,8 +107,7 @@ pub(super) fn is_first_tile(image: &Path) -> bool {
 ///
 /// It does not fit other tiles, because the RPC file does not have their position in the scene.
 fn dimap(stem: &str, name: &str) -> Option<usize> {
-    let first_tile = || stem.strip_prefix("img_")?.strip_suffix("_r1c1");
-    let scene = stem.strip_prefix("dim_").or_else(first_tile)?;
+    let scene = stem.strip_prefix("dim_").or_else(|| product_of_first_tile(stem))?;
     let of_rpc = name.strip_prefix("rpc_")?.strip_suffix(".xml")?;
     let rest = scene.strip_prefix(of_rpc)?;
     (rest.is_empty() || rest.starts_with('_')).then_some(ENDINGS.len() + 1 + rest.len())

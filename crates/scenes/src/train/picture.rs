@@ -130,7 +130,11 @@ pub(super) fn read(
             }
         }
     }
-    Ok((undistortion.map_or_else(|| pixels.clone(), |to| to.apply(&pixels)), left))
+    let pixels = match undistortion {
+        Some(to) => to.apply(&pixels),
+        None => pixels,
+    };
+    Ok((pixels, left))
 }
 
 /// Finds the mask of a photograph.
