@@ -92,8 +92,8 @@ pub fn read_for_image(path: &Path) -> Result<RpcFile, RpcReadError> {
         match image::open(path) {
             Ok(opened) => {
                 if let Some(file) = image::read(path, &opened)? {
-                    // GDAL 3.6 counts the pixels of Pléiades Neo from the first of the RPC's domain,
-                    // which may lie outside of the image, and from 1 without a domain.
+                    // GDAL 3.6 counts the pixels of Pléiades Neo from the first of the RPC's
+                    // domain, which may lie outside of the image, and from 1 without a domain.
                     let beside = match sidecar::is_first_tile(path) {
                         true => sidecar::read(path, Some(&opened), &mut tried)?,
                         false => None,
