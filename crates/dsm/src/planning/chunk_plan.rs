@@ -2,9 +2,9 @@
 //!
 //! Pointing, grid and height step are those of the whole scene, and so are each image's noise and
 //! contrast. Each chunk chooses its own sources among the images that show it. The windows of a
-//! chunk begin on whole pixels of all the levels used, and its hypotheses lie on the scene's
-//! lattice. Neighbouring chunks therefore have the same heights in their overlap, but for what the
-//! paths of the aggregation bring from further away.
+//! chunk begin on whole pixels of all the levels used, their tiles are those of the whole images,
+//! and its hypotheses lie on the scene's lattice. Neighbouring chunks therefore have the same
+//! heights in their overlap, but for what the paths of the aggregation bring from further away.
 //!
 //! The heights of a chunk are found by a coarse sweep of it over all heights that the scene may
 //! have (see `probe`), towers included: a chunk in a plain does not pay for the mountains beside
@@ -26,7 +26,7 @@ use crate::images::image_pixels::read_coarse_view;
 use crate::images::image_windows::GroundBox;
 use crate::images::scene_image::SceneImage;
 use crate::memory;
-use crate::planning::chunk_side::{ENDS_ALIGNED, MARGIN_PX, SIDE_MIN, aligned, needed_mb, quarters, with_rim};
+use crate::planning::chunk_side::{ALIGNED, MARGIN_PX, SIDE_MIN, aligned, needed_mb, quarters, with_rim};
 use crate::planning::grid::DsmGrid;
 use crate::planning::levels::{SweepLevels, choose_levels, smallest_sides};
 use crate::planning::probe;
@@ -250,7 +250,7 @@ impl ChunkPlanner<'_> {
             return Ok(self.range);
         }
         let side = windows.iter().flatten().map(|w| w.width.min(w.height)).min().unwrap_or(0);
-        let sides: Vec<usize> = (0..ENDS_ALIGNED.ilog2()).map(|level| side >> level).collect();
+        let sides: Vec<usize> = (0..ALIGNED.ilog2()).map(|level| side >> level).collect();
         let level = probe::level_of(self.pixel_m, &sides);
         let views = read_chunk_views(self.images, self.characters, windows, |image, window| {
             read_coarse_view(image, window, level)
