@@ -8,8 +8,8 @@
 //!
 //! Where the detail is too fine for the coarse search, tie points tell the same.
 //!
-//! Only images that share ground by their RPCs are compared: of a copy that lies elsewhere no pair
-//! is swept, and in a block such pairs are most of all.
+//! Only images that share most of their ground by their RPCs are compared. A copy that lies
+//! elsewhere has no ties with the others and is set aside, and in a block most pairs share little.
 
 use numeric::upper_median;
 use raster::{Grid, Window, reduce};
@@ -19,7 +19,7 @@ use sweep::SweepView;
 use crate::error::DsmError;
 use crate::images::image_pixels::read_view;
 use crate::images::scene_image::SceneImage;
-use crate::planning::view_geometry::{OVERLAP_MIN, ViewGeometry};
+use crate::planning::view_geometry::ViewGeometry;
 use crate::pointing::ties::{PairTies, TIES_MIN};
 use crate::values::ImagePair;
 
@@ -48,6 +48,8 @@ const ALIKE: f32 = 0.9;
 const ALIKE_AT_HALF: f32 = 0.5;
 /// Sums that are kept side by side, so that they fill the registers of vectors.
 const LANES: usize = 8;
+/// Least ground that two images share by their RPCs to be compared, as a share of the smaller one's.
+const SHARED_MIN: f64 = 0.5;
 /// Shifts of one copy differ by no more than this, pixels. Those of the tests' good pairs, real and
 /// simulated, differ by 7 to 60 pixels.
 const SHIFT_SPREAD: i64 = 1;
@@ -85,7 +87,7 @@ struct Suspect {
     shifts: Vec<[i64; 2]>,
 }
 
-/// Finds two images that are one picture among those that share ground; `views` are the images
+/// Finds two images that are one picture among those that share most of their ground; `views` are the images
 /// where they were read as a whole.
 ///
 /// # Errors
@@ -99,7 +101,7 @@ pub(crate) fn same_picture(
     let (width, height) = (smallest(|image| image.size.0), smallest(|image| image.size.1));
     let side = SIDE.min(width.min(height) / 2);
     let pairs = (0..images.len()).flat_map(|i| (i + 1..images.len()).map(move |j| ImagePair::new(i, j)));
-    let shares_ground = |pair: &ImagePair| geometry.pair(*pair).is_some_and(|p| p.overlap >= OVERLAP_MIN);
+    let shares_ground = |pair: &ImagePair| geometry.pair(*pair).is_some_and(|p| p.overlap >= SHARED_MIN);
     let mut suspects: Vec<Suspect> =
         pairs.filter(shares_ground).map(|pair| Suspect { pair, shifts: Vec::new() }).collect();
     for (x, y) in PLACES {
