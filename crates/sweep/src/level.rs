@@ -337,8 +337,8 @@ mod tests {
         assert!(same(&swept(&views, &[1, 2]), &swept(&changed, &[1, 2])) > 0.99);
     }
 
-    /// Whole tiles are cut off at the upper left of all views, or parts of tiles: the rest keeps its
-    /// heights.
+    /// Whole tiles are cut off at the upper left of all views, or parts of tiles: the rest keeps
+    /// its heights.
     #[test]
     fn where_the_images_begin_does_not_matter() {
         let views = three_views(192);

@@ -48,7 +48,8 @@ const ALIKE: f32 = 0.9;
 const ALIKE_AT_HALF: f32 = 0.5;
 /// Sums that are kept side by side, so that they fill the registers of vectors.
 const LANES: usize = 8;
-/// Least ground that two images share by their RPCs to be compared, as a share of the smaller one's.
+/// Least ground that two images share by their RPCs to be compared, as a share of the smaller
+/// one's.
 const SHARED_MIN: f64 = 0.5;
 /// Shifts of one copy differ by no more than this, pixels. Those of the tests' good pairs, real and
 /// simulated, differ by 7 to 60 pixels.
@@ -87,8 +88,8 @@ struct Suspect {
     shifts: Vec<[i64; 2]>,
 }
 
-/// Finds two images that are one picture among those that share most of their ground; `views` are the images
-/// where they were read as a whole.
+/// Finds two images that are one picture among those that share most of their ground; `views` are
+/// the images where they were read as a whole.
 ///
 /// # Errors
 /// [`DsmError::Image`] for an image that cannot be read.
