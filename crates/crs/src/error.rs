@@ -62,9 +62,8 @@ pub enum CrsError {
     },
     /// The geoid grid that is needed is not installed.
     #[error(
-        "heights above {datum} need {}, which PROJ does not find: --fetch-grids (in Python \
-         skysweep.fetch_grids()) fetches it from https://cdn.proj.org, or put the file into one of the folders that \
-         PROJ searches ({})",
+        "heights above {datum} need {}, which PROJ does not find: put the file into one of the folders that PROJ \
+         searches ({}), or allow grids to be fetched from https://cdn.proj.org",
         grids(.candidates),
         listed(.folders)
     )]
