@@ -149,7 +149,8 @@ struct Wish {
 
 impl Wish {
     fn read(body: &[u8]) -> Result<(Similarity, Vec<PointPair>), String> {
-        let wish: Self = serde_json::from_slice(body).map_err(|error| format!("the request is not readable: {error}"))?;
+        let wish: Self =
+            serde_json::from_slice(body).map_err(|error| format!("the request is not readable: {error}"))?;
         let Placed { scale, rotation, translation } = wish.world_from_model;
         let placed = Similarity::new(scale, rotation, translation).map_err(|error| error.to_string())?;
         let pairs = wish.pairs.iter().map(|pair| PointPair { source: pair.model, target: pair.world });
@@ -194,7 +195,11 @@ impl PageJob for Desk {
 fn refused(error: &AlignJobError) -> String {
     let text = with_causes(error);
     let exists = text.contains(io::atomic::OUTPUT_EXISTS);
-    if exists { format!("{text}. Nothing was written: start the page so that it may overwrite, or with another folder") } else { text }
+    if exists {
+        format!("{text}. Nothing was written: start the page so that it may overwrite, or with another folder")
+    } else {
+        text
+    }
 }
 
 impl Desk {

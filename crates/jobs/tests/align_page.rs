@@ -206,7 +206,9 @@ fn requests_that_mean_nothing_are_refused_in_words() {
         for name in ["fit", "save"] {
             assert!(client.refused(name, "{").contains("not readable"));
             assert!(client.refused(name, &wish(&|body| body["more"] = json!(1))).contains("not readable"));
-            assert!(client.refused(name, &wish(&|body| body["world_from_model"]["scale"] = json!(0))).contains("scale"));
+            assert!(
+                client.refused(name, &wish(&|body| body["world_from_model"]["scale"] = json!(0))).contains("scale")
+            );
             let mirror = |body: &mut Value| body["world_from_model"]["rotation"][0][0] = json!(-1);
             assert!(client.refused(name, &wish(&mirror)).contains("mirrors"));
         }
@@ -215,7 +217,8 @@ fn requests_that_mean_nothing_are_refused_in_words() {
         assert!(client.refused("fit", &wish(&|body| body["pairs"] = above.clone())).contains("line"));
         let many = vec![json!({ "model": [0, 0, 0], "world": [0, 0, 0] }); 1001];
         assert!(client.refused("save", &wish(&|body| body["pairs"] = json!(many))).contains("at most 1000"));
-        for name in ["photo/999.png", "photo/-1.png", "photo/+1.png", "photo/..%2f1.png", "photo/12345678.png", "other.json"]
+        for name in
+            ["photo/999.png", "photo/-1.png", "photo/+1.png", "photo/..%2f1.png", "photo/12345678.png", "other.json"]
         {
             assert_eq!(client.asked("GET", name, "").0, 404, "{name}");
         }

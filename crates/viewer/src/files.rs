@@ -5,7 +5,7 @@ use hyper::body::Bytes;
 use super::http::Answer;
 
 /// Files of the page by their names in the address: name, type, content.
-const FILES: [(&str, &str, &str); 22] = [
+const FILES: [(&str, &str, &str); 23] = [
     ("", HTML, include_str!("page/index.html")),
     ("style.css", "text/css; charset=utf-8", include_str!("page/style.css")),
     ("main.js", SCRIPT, include_str!("page/main.js")),
@@ -25,6 +25,7 @@ const FILES: [(&str, &str, &str); 22] = [
     (ALIGN, HTML, include_str!("page/align/index.html")),
     ("align/align.css", "text/css; charset=utf-8", include_str!("page/align/align.css")),
     ("align/main.js", SCRIPT, include_str!("page/align/main.js")),
+    ("align/clouds.js", SCRIPT, include_str!("page/align/clouds.js")),
     ("align/similarity.js", SCRIPT, include_str!("page/align/similarity.js")),
     ("align/dots.js", SCRIPT, include_str!("page/align/dots.js")),
     ("align/views.js", SCRIPT, include_str!("page/align/views.js")),

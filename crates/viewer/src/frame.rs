@@ -33,7 +33,8 @@ impl MapFrame {
         let Some(first) = scene.rasters.first().filter(|_| scene.map.is_placed) else { return Ok(None) };
         let corners = [(0, 0), (first.width, 0), (0, first.height), (first.width, first.height)];
         let map = corners.map(|(x, y)| first.transform.map_from_cell(x as f64 - 0.5, y as f64 - 0.5));
-        let bound = |pick: fn(f64, f64) -> f64, start| map.iter().fold([start; 2], |b, m| [pick(b[0], m.0), pick(b[1], m.1)]);
+        let bound =
+            |pick: fn(f64, f64) -> f64, start| map.iter().fold([start; 2], |b, m| [pick(b[0], m.0), pick(b[1], m.1)]);
         let (low, high) = (bound(f64::min, f64::INFINITY), bound(f64::max, f64::NEG_INFINITY));
         let (mut ground_m, mut vertical) = (None, None);
         if let Some(raster) = scene.heights() {

@@ -127,7 +127,8 @@ impl ViewServer {
             let work = || self.work(job, &received, &counts);
             let spawn = |_| std::thread::Builder::new().name("view".to_owned()).spawn_scoped(scope, work);
             (0..WORKERS).try_for_each(|i| spawn(i).map(drop))?;
-            let served = runtime.block_on(serve(listener, questions, job.is_some(), || progress.is_cancelled() || is_over()));
+            let served =
+                runtime.block_on(serve(listener, questions, job.is_some(), || progress.is_cancelled() || is_over()));
             // The connections end with the runtime, and the threads when no connection may ask.
             drop(runtime);
             served
@@ -144,12 +145,7 @@ impl ViewServer {
     }
 
     /// Answers one request after the other until no more can come.
-    fn work(
-        &self,
-        job: Option<&dyn PageJob>,
-        questions: &Mutex<mpsc::UnboundedReceiver<Question>>,
-        counts: &Counts,
-    ) {
+    fn work(&self, job: Option<&dyn PageJob>, questions: &Mutex<mpsc::UnboundedReceiver<Question>>, counts: &Counts) {
         let mut answers = Answers::new(&self.scene, &self.space, job);
         let next = || questions.lock().unwrap_or_else(PoisonError::into_inner).blocking_recv();
         while let Some(question) = next() {

@@ -191,7 +191,9 @@ fn a_page_over_a_map_takes_the_place_of_positions() {
     assert!(!out.exists(), "nothing was written");
     by_hand(&[]).code(2).stderr(predicate::str::contains("--positions"));
     by_hand(&["--open"]).code(2).stderr(predicate::str::contains("--page"));
-    by_hand(&["--page", &map, "--positions", "gps.csv"]).code(2).stderr(predicate::str::contains("cannot be used with"));
+    by_hand(&["--page", &map, "--positions", "gps.csv"])
+        .code(2)
+        .stderr(predicate::str::contains("cannot be used with"));
     let image = town.join("view_1.tif").display().to_string();
     by_hand(&["--page", &image]).code(2).stderr(predicate::str::contains("no coordinate system"));
 }

@@ -199,7 +199,8 @@ mod tests {
 
     #[test]
     fn the_normal_of_a_plane_is_on_the_side_of_the_cameras() {
-        let grid = || (0..100).map(|i| [f64::from(i % 10) - 4.5, 0.3 * (f64::from(i / 10) - 4.5), f64::from(i / 10) - 4.5]);
+        let grid =
+            || (0..100).map(|i| [f64::from(i % 10) - 4.5, 0.3 * (f64::from(i / 10) - 4.5), f64::from(i / 10) - 4.5]);
         let wild = std::iter::once([0.0, 1e6, -1e6]);
         let expected = Vector3::new(0.0, 1.0, -0.3).normalize();
         for above in [1.0, -1.0] {

@@ -385,8 +385,8 @@ fn start(model: &ModelWithPoints, folder: &Path, map: &AlignMap, pivot: [f64; 3]
         let [west, south, east, north] = map.bounds;
         (west..=east).contains(&p[0]) && (south..=north).contains(&p[1])
     };
-    let own = std::fs::read(folder.join("origin.json")).ok();
-    let own = own.and_then(|text| serde_json::from_slice::<LocalOrigin>(&text).ok());
+    let own = io::read_regular_text(&folder.join("origin.json"), files::TEXT_LIMIT).ok();
+    let own = own.and_then(|text| serde_json::from_str::<LocalOrigin>(&text).ok());
     let own = own.filter(|own| own.crs == map.crs).map_or([0.0; 3], |own| own.origin);
     if on_map([0, 1, 2].map(|i| pivot[i] + own[i])) {
         let parts = SimilarityParts {

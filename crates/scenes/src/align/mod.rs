@@ -14,8 +14,8 @@ mod world;
 use std::path::Path;
 
 use colmap::align::{
-    AlignConfig, AlignError, CameraUp, Disturbance, ModelAlignment, NoiseLevel, PointPair, align, align_upright, camera_up,
-    disturbed, sensitivity, spread_ratio, tilt_sigma_deg,
+    AlignConfig, AlignError, CameraUp, Disturbance, ModelAlignment, NoiseLevel, PointPair, align, align_upright,
+    camera_up, disturbed, sensitivity, spread_ratio, tilt_sigma_deg,
 };
 use io::splat_ply::LocalOrigin;
 use serde::Serialize;

@@ -46,10 +46,8 @@ impl Photographs {
         };
         let place = |column: usize, row: usize| -> Option<(usize, usize)> {
             let full = |at: usize, small: usize, large: usize| (at as f64 + 0.5) * large as f64 / small as f64 - 0.5;
-            let pixel = ImagePoint {
-                sample: full(column, size.0, lens.width()),
-                line: full(row, size.1, lens.height()),
-            };
+            let pixel =
+                ImagePoint { sample: full(column, size.0, lens.width()), line: full(row, size.1, lens.height()) };
             let found = seen(lens, pixel)?;
             let back = |at: f64, small: usize, large: usize| ((at + 0.5) * small as f64 / large as f64).floor();
             let (x, y) = (back(found.sample, size.0, lens.width()), back(found.line, size.1, lens.height()));
@@ -78,4 +76,48 @@ fn seen(lens: &Lens, pixel: ImagePoint) -> Option<ImagePoint> {
     let pinhole = Lens::new(lens.width(), lens.height(), LensModel::Pinhole, &parameters).ok()?;
     let [x, y] = pinhole.direction(pixel)?;
     lens.project(x, y)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A picture whose red is the column and whose green is the row.
+    fn shown(lens: &Lens, [width, height]: [u32; 2]) -> image::RgbaImage {
+        let folder = tempfile::tempdir().unwrap();
+        let picture = image::RgbImage::from_fn(width, height, |x, y| image::Rgb([x as u8, y as u8, 255]));
+        picture.save(folder.path().join("a.png")).unwrap();
+        let png = Photographs::new(folder.path().to_owned()).png("a.png", lens).unwrap();
+        image::load_from_memory(&png).unwrap().to_rgba8()
+    }
+
+    #[test]
+    fn a_pinhole_shows_its_photograph_and_a_lens_what_a_pinhole_sees() {
+        let pinhole = Lens::new(200, 150, LensModel::Pinhole, &[180.0, 180.0, 99.5, 74.5]).unwrap();
+        let plain = shown(&pinhole, [200, 150]);
+        assert!(plain.enumerate_pixels().all(|(x, y, p)| p.0 == [x as u8, y as u8, 255, 255]));
+        let lens = Lens::new(200, 150, LensModel::SimpleRadial, &[180.0, 99.5, 74.5, 0.3]).unwrap();
+        let straight = shown(&lens, [200, 150]);
+        let (mut inside, mut outside) = (0, 0);
+        for (x, y, pixel) in straight.enumerate_pixels() {
+            let [u, v] = pinhole.direction(ImagePoint { sample: f64::from(x), line: f64::from(y) }).unwrap();
+            let at = lens.project(u, v).unwrap();
+            if pixel.0[3] == 0 {
+                outside += 1;
+                assert!(at.sample < 0.0 || at.line < 0.0 || at.sample > 199.0 || at.line > 149.0, "{x} {y}");
+            } else {
+                inside += 1;
+                let off = (f64::from(pixel.0[0]) - at.sample).abs().max((f64::from(pixel.0[1]) - at.line).abs());
+                assert!(off <= 0.51, "{x} {y}: {off}");
+            }
+        }
+        assert!(inside > 20_000 && outside > 100, "{inside} {outside}");
+    }
+
+    #[test]
+    fn a_large_photograph_is_shown_small() {
+        let lens = Lens::new(4000, 3000, LensModel::Pinhole, &[3000.0, 3000.0, 2000.0, 1500.0]).unwrap();
+        let small = shown(&lens, [400, 300]);
+        assert_eq!((small.width(), small.height()), (1024, 768), "stretched to the shape of its camera");
+    }
 }

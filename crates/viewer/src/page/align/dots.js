@@ -86,14 +86,3 @@ export function nearest({ points, colours }, [r0, r1, r2], at, radius, isPinhole
   const near = found.filter((one) => one.away <= least + 2);
   return near.reduce((best, one) => (one.depth < best.depth ? one : best)).i;
 }
-
-/** Returns colours of heights between two, from dark blue by green to yellow. */
-export function heightColours(heights, low, high, alpha) {
-  const stops = [[68, 20, 110], [50, 90, 160], [30, 155, 138], [120, 205, 80], [250, 225, 40]];
-  return Uint32Array.from(heights, (height) => {
-    const t = 4 * Math.min(1, Math.max(0, (height - low) / Math.max(high - low, 1e-6)));
-    const k = Math.min(3, Math.floor(t));
-    const [r, g, b] = [0, 1, 2].map((c) => Math.round(stops[k][c] + (t - k) * (stops[k + 1][c] - stops[k][c])));
-    return ((alpha << 24) | (b << 16) | (g << 8) | r) >>> 0;
-  });
-}

@@ -7,7 +7,8 @@
 import { MapView } from "../map.js";
 import { apply, ask, compose } from "../numbers.js";
 import { Vectors } from "../vectors.js";
-import { Dots, heightColours, nearest } from "./dots.js";
+import { cloudOf, coloursByHeight, groundOf } from "./clouds.js";
+import { Dots, nearest } from "./dots.js";
 import { after, Placement } from "./similarity.js";
 import { cross, drawPair, mark, PhotoView, SideView, wrapped } from "./views.js";
 
@@ -21,6 +22,10 @@ const RING_WIDTH = 9;
 const NEAR = 9;
 /** Longest side of the reduced heights that are drawn as points. */
 const GROUND_SIDE = 256;
+/** Colour of the map's heights from the side (0xAABBGGRR): none of the model. */
+const GROUND_COLOUR = 0xffb8a890;
+/** Colour of the middle of the model. */
+const MIDDLE = "#fff";
 
 const [scene, opening, cloud] = await Promise.all([
   ask("scene.json").then((answer) => answer.json()),
@@ -38,18 +43,6 @@ const past = [];
 let tool = "move";
 let pending = null;
 let names = 0;
-
-/** Reads the points: x, y, z from the pivot, and colours. */
-function cloudOf(buffer) {
-  const [floats, bytes] = [new Float32Array(buffer), new Uint32Array(buffer)];
-  const count = floats.length / 4;
-  const [points, colours] = [new Float32Array(3 * count), new Uint32Array(count)];
-  for (let i = 0; i < count; i++) {
-    points.set(floats.subarray(4 * i, 4 * i + 3), 3 * i);
-    colours[i] = bytes[4 * i + 3] | 0xff000000;
-  }
-  return { points, colours };
-}
 
 // The map, and the model over it.
 
@@ -80,7 +73,7 @@ function drawOver() {
   for (const pair of pairs) drawPair(context, onScreen(placement.apply(pair.model)), onScreen(pair.world), pair.name);
   if (pending) mark(context, ...onScreen(placement.apply(pending)), "#ffe14a");
   const [x, y] = onScreen(placement.place);
-  cross(context, x, y, "#e0306e", 9);
+  cross(context, x, y, MIDDLE, 11);
   if (tool === "move") drawRing(context, x, y);
   const { width, text } = map.scaleBar();
   $("bar").firstElementChild.style.width = `${width}px`;
@@ -124,12 +117,17 @@ function changed() {
     north: (origin[1] + place[1]).toFixed(3),
     height: (origin[2] + place[2]).toFixed(3),
     scale: String(Number(scale.toPrecision(9))),
-    heading: heading.toFixed(4),
-    "tilt-east": tiltEast.toFixed(4),
-    "tilt-north": tiltNorth.toFixed(4),
+    heading: degrees(heading),
+    "tilt-east": degrees(tiltEast),
+    "tilt-north": degrees(tiltNorth),
   };
   for (const [id, text] of Object.entries(values)) if (document.activeElement !== $(id)) $(id).value = text;
   showResiduals();
+}
+
+/** Returns degrees without a minus before zeros. */
+function degrees(angle) {
+  return angle.toFixed(4).replace(/^-(0\.0*)$/, "$1");
 }
 
 let frame = 0;
@@ -411,27 +409,12 @@ $("axis").addEventListener("change", () => {
 });
 $("strip").addEventListener("change", () => ((side.strip = Number($("strip").value)), queue()));
 
-/** Makes the heights of the map points, for the photograph and the view from the side. */
 async function loadGround() {
   if (heights === null) return;
   const raster = scene.rasters[heights];
-  const bytes = await (await ask(`grid/${heights}?c=0&r=0&w=${raster.width}&h=${raster.height}&side=${GROUND_SIDE}`)).arrayBuffer();
-  const [columns, rows] = new Uint32Array(bytes, 0, 2);
-  const values = new Float32Array(bytes, 8);
-  const [x, a, c, y, b, d] = raster.transform;
-  const points = [];
-  for (let i = 0; i < values.length; i++) {
-    if (!Number.isFinite(values[i])) continue;
-    const u = (((i % columns) + 0.5) * raster.width) / columns;
-    const v = ((Math.floor(i / columns) + 0.5) * raster.height) / rows;
-    points.push(x + u * a + v * c - origin[0], y + u * b + v * d - origin[1], values[i] - origin[2]);
-  }
-  const ups = points.filter((_, i) => i % 3 === 2);
-  const sorted = Float64Array.from(ups).sort();
-  const at = (share) => sorted[Math.floor(share * (sorted.length - 1))];
-  const ground = { points: Float32Array.from(points), colours: heightColours(ups, at(0.02), at(0.98), 150) };
-  photo.ground = ground;
-  side.ground = { points: ground.points, colours: Uint32Array.from(ups, () => 0xff2f8fd8) };
+  const answer = await ask(`grid/${heights}?c=0&r=0&w=${raster.width}&h=${raster.height}&side=${GROUND_SIDE}`);
+  photo.ground = groundOf(await answer.arrayBuffer(), raster, origin);
+  side.ground = { points: photo.ground.points, colours: photo.ground.colours.map(() => GROUND_COLOUR) };
 }
 
 // Tools, numbers, keys.
@@ -475,6 +458,13 @@ for (const [id, take] of Object.entries(fields)) {
 }
 $("ground").value = (opening.ground_m ?? 0).toFixed(2);
 $("ground").addEventListener("input", () => ((side.level = Number($("ground").value) - origin[2]), queue()));
+const looks = { photographs: cloud.colours, heights: coloursByHeight(cloud, placement.base[2]) };
+$("colours").addEventListener("change", () => {
+  cloud.colours = looks[$("colours").value];
+  map.redraw();
+  queue();
+});
+cloud.colours = looks.heights;
 $("opacity").addEventListener("input", () => ($("over").style.opacity = $("opacity").value));
 
 const actions = {

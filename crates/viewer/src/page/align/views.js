@@ -57,7 +57,7 @@ export class SideView {
     const on = (p) => projection.slice(0, 2).map((row) => row[0] * p[0] + row[1] * p[1] + row[2] * p[2] + row[3]);
     for (const pair of pairs) drawPair(context, on(placement.apply(pair.model)), on(pair.world), pair.name);
     const [x, y] = on(placement.place);
-    cross(context, x, y, "#e0306e", 7);
+    cross(context, x, y, "#fff", 9);
   }
 
   drawScale(context) {
