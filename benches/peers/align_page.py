@@ -26,7 +26,7 @@ import shutil
 import subprocess
 import sys
 
-from viewer import KINDS, PAGE, ROOT, Checks, environment, figure
+from viewer import KINDS, PAGE, ROOT, Checks, environment
 
 AIM_PX = 1.0
 WANTED_M, WANTED_DEG = 0.5, 0.5
@@ -40,6 +40,9 @@ def make_flight(skysweep, folder):
     flight = folder / "flight"
     if not (flight / "cameras/sparse/0/points3D.txt").exists():
         subprocess.run([skysweep, "simulate", "town", "--flight", "24", "--views", "2", "-o", flight, "--overwrite", "-q"], check=True)
+    footprints = flight / "footprints.geojson"
+    if not footprints.exists():
+        subprocess.run([skysweep, "city", "convert", flight / "truth/buildings.city.json", "-o", footprints, "-q"], check=True)
     return flight
 
 
@@ -335,6 +338,16 @@ def by_pairs(desk, flight, ground):
     return made
 
 
+def figure(page, wanted):
+    """Takes the picture of the guide."""
+    if not wanted:
+        return
+    import io
+    from PIL import Image
+    page.evaluate("document.querySelector('aside').scrollTo(0, 0)")
+    Image.open(io.BytesIO(page.screenshot())).convert("RGB").save(ROOT / "docs/figures/align_page.webp", quality=80)
+
+
 def one_seed(playwright, arguments, seed, checks, asked):
     import numpy as np
     flight_folder = make_flight(arguments.skysweep, arguments.work)
@@ -344,8 +357,8 @@ def one_seed(playwright, arguments, seed, checks, asked):
         flight = Flight(flight_folder, arguments.work / f"model_{seed}", seed)
         out = arguments.work / f"out_{seed}_{way}"
         shutil.rmtree(out, ignore_errors=True)
-        command = [arguments.skysweep, "align", flight.folder, "--page", truth / "ortho.tif", truth / "dsm.tif", "--images",
-                   flight_folder / "cameras/images", "-o", out, "--for", "600", "-q"]
+        command = [arguments.skysweep, "align", flight.folder, "--page", truth / "ortho.tif", truth / "dsm.tif",
+                   flight_folder / "footprints.geojson", "--images", flight_folder / "cameras/images", "-o", out, "--for", "600", "-q"]
         server = subprocess.Popen([str(word) for word in command], stdout=subprocess.PIPE, text=True)
         try:
             url = server.stdout.readline().strip()
@@ -358,9 +371,10 @@ def one_seed(playwright, arguments, seed, checks, asked):
             if way == "pairs":
                 checks.check(made == PAIRS, f"seed {seed}: {made} pairs are picked on photographs and the map")
                 if is_first:
+                    desk.page.check("#vectors input")
                     desk.page.select_option("#camera", label=next(iter(flight.cameras)))
                     desk.settle()
-                    figure(desk.page, "align_page.png", arguments.figures)
+                    figure(desk.page, arguments.figures)
             desk.page.click("#save")
             desk.page.wait_for_function("document.getElementById('saved').textContent !== ''", timeout=20000)
             distance, angle, scale = flight.judge(out)
@@ -389,7 +403,7 @@ def look_further(desk, out, checks):
     page.click("#message button")
     page.keyboard.press("m")
     before = page.input_value("#east")
-    desk.drag("#over", [200, 200], [260, 220])
+    desk.drag("#over", [300, 320], [360, 340])
     moved = page.input_value("#east")
     page.keyboard.press("z")
     checks.check(before != moved and page.input_value("#east") == before, "Z takes a move back")

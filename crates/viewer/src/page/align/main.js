@@ -339,7 +339,7 @@ function showResiduals() {
   }
   $("pairs").hidden = !pairs.length;
   $("fit-pairs").disabled = !pairs.length;
-  $("residual").textContent = pairs.length ? `RMS of ${pairs.length}: ${Math.sqrt(squares / pairs.length).toFixed(2)} m (flat and up in metres)` : "";
+  $("residual").textContent = pairs.length ? `RMS ${Math.sqrt(squares / pairs.length).toFixed(2)} m` : "";
 }
 
 const wish = () => ({ world_from_model: placement.similarity, pairs: pairs.map(({ model, world }) => ({ model, world })) });
@@ -510,7 +510,7 @@ const drawn = cloud.colours.length.toLocaleString("en");
 $("count").textContent = opening.stride > 1
   ? `${drawn} of ${opening.points.toLocaleString("en")} points are drawn, one in ${opening.stride}; ${opening.start.up_from}.`
   : `All ${drawn} points are drawn; ${opening.start.up_from}.`;
-$("output").textContent = `Writes the moved model, its origin and the similarity to ${opening.output}.`;
+$("output").textContent = `The moved model and its similarity go to ${opening.output}.`;
 for (const [number, one] of scene.vectors.entries()) {
   const vectors = new Vectors(one, number, scene.vectors);
   const label = document.createElement("label");
