@@ -358,8 +358,9 @@ def one_seed(playwright, arguments, seed, checks, asked):
         out = arguments.work / f"out_{seed}_{way}"
         shutil.rmtree(out, ignore_errors=True)
         command = [arguments.skysweep, "align", flight.folder, "--page", truth / "ortho.tif", truth / "dsm.tif",
-                   flight_folder / "footprints.geojson", "--images", flight_folder / "cameras/images", "-o", out, "--for", "600", "-q"]
-        server = subprocess.Popen([str(word) for word in command], stdout=subprocess.PIPE, text=True)
+                   flight_folder / "footprints.geojson", "--images", flight_folder / "cameras/images", "-o", out.name, "--for", "600", "-q"]
+        server = subprocess.Popen([str(word) for word in command], stdout=subprocess.PIPE, text=True,
+                                  cwd=arguments.work)
         try:
             url = server.stdout.readline().strip()
             desk = Desk(playwright, arguments, url, np.random.default_rng([seed, way == "pairs"]))
@@ -430,6 +431,8 @@ def main():
     if not arguments.chromium:
         print("skipped: there is no Chromium; install it, or name it with --chromium")
         return 0
+    arguments.work = arguments.work.resolve()
+    arguments.skysweep = str(pathlib.Path(arguments.skysweep).resolve())
     arguments.work.mkdir(parents=True, exist_ok=True)
     try:
         from playwright.sync_api import sync_playwright

@@ -116,7 +116,7 @@ function changed() {
     east: (origin[0] + place[0]).toFixed(3),
     north: (origin[1] + place[1]).toFixed(3),
     height: (origin[2] + place[2]).toFixed(3),
-    scale: String(Number(scale.toPrecision(9))),
+    scale: String(Number(scale.toPrecision(7))),
     heading: degrees(heading),
     "tilt-east": degrees(tiltEast),
     "tilt-north": degrees(tiltNorth),
