@@ -377,7 +377,7 @@ def one_seed(playwright, arguments, seed, checks, asked):
                     desk.settle()
                     figure(desk.page, arguments.figures)
             desk.page.click("#save")
-            desk.page.wait_for_function("document.getElementById('saved').textContent !== ''", timeout=20000)
+            desk.page.wait_for_selector("#saved:not(:empty)", timeout=20000)
             distance, angle, scale = flight.judge(out)
             checks.check(distance <= WANTED_M and angle <= WANTED_DEG,
                          f"seed {seed}, {way}: points {distance:.2f} m off, rotation {angle:.2f}°, scale {scale:+.2f} %")
@@ -398,7 +398,7 @@ def look_further(desk, out, checks):
     wanted = ["align.html", "align.json", "cameras.bin", "images.bin", "origin.json", "pairs.csv", "points3D.bin", "similarity.json"]
     checks.check(files == wanted, "the folder has the outputs of align and the pairs")
     page.click("#save")
-    page.wait_for_function("!document.getElementById('message').hidden", timeout=20000)
+    page.wait_for_selector("#message:not([hidden])", timeout=20000)
     told = page.locator("#message").inner_text()
     checks.check("Nothing was saved" in told and "exist" in told, "a second save without --overwrite is refused in words")
     page.click("#message button")

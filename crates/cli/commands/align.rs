@@ -79,9 +79,9 @@ pub(crate) struct Args {
 #[derive(Debug, clap::Args)]
 #[group(id = "page options")]
 struct PageArgs {
-    /// Lay the points over a map by hand, on a page in the browser: an ortho, a satellite image on a
-    /// map, a surface model or the folder of a run, and footprints to draw over it. The first raster
-    /// sets the coordinate system; heights are those of the first surface model.
+    /// Lay the points over a map by hand, on a page in the browser: an ortho, a satellite image
+    /// on a map, a surface model or the folder of a run, and footprints to draw over it. The first
+    /// raster sets the coordinate system; heights are those of the first surface model.
     #[arg(
         long,
         value_name = "RUN|FILE",

@@ -147,7 +147,8 @@ fn clicked_pairs_bring_the_model_back_and_are_saved() {
         assert!(at[0].hypot(at[1]) < 1.0 && opening["crs"] == "EPSG:32631", "{at:?}");
         let pair = |i: usize, off: [f64; 3]| {
             let place = plus(world.apply(points[i].position), off);
-            json!({ "model": points[i].position, "world": [0, 1, 2].map(|k| place[k] - origin[k]) })
+            let place = plus(place, origin.map(|c| -c));
+            json!({ "model": points[i].position, "world": place })
         };
         let off = |parts: &Value, i: usize| {
             apart(plus(moved(parts, points[i].position), origin), world.apply(points[i].position))

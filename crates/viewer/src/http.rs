@@ -1,9 +1,9 @@
 //! Requests and responses of HTTP/1.1, one per connection, within fixed bounds. `hyper` reads and
 //! writes them.
 //!
-//! A head has at most 16 KiB, 64 fields and five seconds. A body is read only where a job behind the
-//! page takes some, and has at most 256 KiB. Connections wait for their clients without a thread, so
-//! that slow ones keep nobody from being answered.
+//! A head has at most 16 KiB, 64 fields and five seconds. A body is read only where a job behind
+//! the page takes some, and has at most 256 KiB. Connections wait for their clients without a
+//! thread, so that slow ones keep nobody from being answered.
 
 use std::convert::Infallible;
 use std::future::poll_fn;

@@ -65,12 +65,12 @@ pub fn camera_up(rotations: &[[[f64; 3]; 3]]) -> Option<CameraUp> {
 }
 
 /// Returns the least-squares similarity of pairs among those that turn a rotation about the
-/// vertical only: what `upright` turns up stays up. With x' = R₀ (x − x̄) and M = Σ (y − ȳ) x'ᵀ, the
-/// angle is atan2(M₁₀ − M₀₁, M₀₀ + M₁₁), and s = tr(Rᵀ M) / Σ |x'|².
+/// vertical only: what `upright` turns up stays up. With x' = R₀ (x − x̄) and M = Σ (y − ȳ) x'ᵀ,
+/// the angle is atan2(M₁₀ − M₀₁, M₀₀ + M₁₁), and s = tr(Rᵀ M) / Σ |x'|².
 ///
 /// # Errors
-/// [`AlignError::TooFew`] below two pairs, [`AlignError::NotFinite`], [`AlignError::Degenerate`] for
-/// pairs above one another, which determine no heading.
+/// [`AlignError::TooFew`] below two pairs, [`AlignError::NotFinite`], [`AlignError::Degenerate`]
+/// for pairs above one another, which determine no heading.
 ///
 /// ```
 /// use colmap::align::{PointPair, fit_level};

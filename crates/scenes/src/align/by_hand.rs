@@ -2,8 +2,8 @@
 //! places that are known in both.
 //!
 //! The map's heights are above the datum of its surface. A page works in that frame. What is saved
-//! is above the ellipsoid, as every alignment is: one shift, that of the middle of the map, is added
-//! to all heights.
+//! is above the ellipsoid, as every alignment is: one shift, that of the middle of the map, is
+//! added to all heights.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
