@@ -52,6 +52,8 @@ const GROUPS: [(&str, &[&str]); 5] = [
             "camera",
             "center",
             "positions",
+            "page",
+            "images",
         ],
     ),
     (
