@@ -5,7 +5,8 @@ fn main() {
     if std::env::var_os("CARGO_CFG_SKYSWEEP_STATIC").is_none() {
         return;
     }
-    // GDAL is configured with the headers of the system, and linked with the archive that `openjpeg-sys` compiles.
+    // GDAL is configured with the headers of the system, and linked with the archive that
+    // `openjpeg-sys` compiles.
     if let Err(error) = pkg_config::Config::new().cargo_metadata(false).probe("libopenjp2") {
         panic!(
             "OpenJPEG was not found, which the static build needs: install its development package (Debian, \
