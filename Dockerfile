@@ -11,7 +11,7 @@ COPY . .
 RUN CARGO_INCREMENTAL=0 cargo build --release --locked --bin skysweep
 
 FROM debian:bookworm-slim
-# proj-data holds the geoid grids that Debian may ship; those of EGM2008 are fetched by projsync, if they are needed.
+# proj-data holds the geoid grids that Debian may ship; --fetch-grids fetches others.
 RUN apt-get update -qq \
     && apt-get install -y -qq --no-install-recommends libgdal32 libproj25 proj-bin proj-data \
     && rm -rf /var/lib/apt/lists/*

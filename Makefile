@@ -71,7 +71,9 @@ demo: setup ## a surface model of the sample town, its accuracy and its picture,
 	echo "report         $(DEMO)/report/report.html"
 
 test: setup ## unit, property, integration and documentation tests, and those of the Python package
-	@cargo test --workspace
+	@crates/python/tests/environment.sh > /dev/null & ENVIRONMENT=$$!
+	cargo test --workspace
+	wait "$$ENVIRONMENT" || true
 	crates/python/tests/run.sh
 
 quick: check ## before a commit: format, clippy, rules of the code and of the pages, unit tests of the crates that differ from BASE (HEAD~1)

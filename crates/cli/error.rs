@@ -10,6 +10,9 @@ pub(crate) const OVERWRITE: &str = "nothing was written: give --overwrite to rep
 /// Hint for an input on a network.
 const REMOTE: &str = "--allow-remote reads rasters from web addresses (https://…) that are given as inputs";
 
+/// Hint for a geoid grid that is missing.
+const GRIDS: &str = "--fetch-grids fetches geoid grids that PROJ does not find, once";
+
 /// Advice that names options of the command line; errors of the library do not know them.
 #[derive(Debug)]
 struct Hint(String);
@@ -52,7 +55,8 @@ pub(crate) fn report(e: &anyhow::Error) {
     }
     let overwrite = || text.contains(io::atomic::OUTPUT_EXISTS).then(|| OVERWRITE.to_owned());
     let remote = || text.contains("or allow addresses").then(|| REMOTE.to_owned());
-    if let Some(hint) = hint.map(Hint::to_string).or_else(overwrite).or_else(remote) {
+    let grids = || text.contains("or allow grids to be fetched").then(|| GRIDS.to_owned());
+    if let Some(hint) = hint.map(Hint::to_string).or_else(overwrite).or_else(remote).or_else(grids) {
         text.push_str(&format!("  hint: {hint}\n"));
     }
     // Where even standard error is closed, only the exit code is left.

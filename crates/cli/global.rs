@@ -9,6 +9,10 @@ pub(crate) struct Global {
     /// is never fetched.
     #[arg(long, global = true)]
     pub(crate) allow_remote: bool,
+    /// Fetch geoid grids that PROJ does not find from <https://cdn.proj.org>, once, into PROJ's
+    /// folder of the user.
+    #[arg(long, global = true)]
+    pub(crate) fetch_grids: bool,
     /// Print errors only.
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     pub(crate) quiet: bool,

@@ -110,6 +110,9 @@ fn main() -> ExitCode {
     if cli.global.allow_remote {
         jobs::remote::allow_remote();
     }
+    if cli.global.fetch_grids {
+        jobs::remote::fetch_grids();
+    }
     match run(&cli) {
         Ok(Outcome::Complete) => ExitCode::SUCCESS,
         Ok(Outcome::Partial(what)) => {

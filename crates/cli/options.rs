@@ -52,6 +52,8 @@ const GROUPS: [(&str, &[&str]); 5] = [
             "camera",
             "center",
             "positions",
+            "page",
+            "images",
         ],
     ),
     (
@@ -83,7 +85,7 @@ const GROUPS: [(&str, &[&str]); 5] = [
         ],
     ),
     ("Requirements (exit code 1 when missed)", &["max_mae", "min_completeness", "max_rmse"]),
-    ("Run", &["threads", "memory", "chunk", "tile", "port", "seconds", "open", "allow_remote"]),
+    ("Run", &["threads", "memory", "chunk", "tile", "port", "seconds", "open", "allow_remote", "fetch_grids"]),
     ("Messages", &["progress", "json", "quiet", "verbose", "help", "version"]),
 ];
 

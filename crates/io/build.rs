@@ -5,12 +5,9 @@ fn main() {
     if std::env::var_os("CARGO_CFG_SKYSWEEP_STATIC").is_none() {
         return;
     }
-    let found = pkg_config::Config::new().cargo_metadata(false).probe("libopenjp2").and_then(|_| {
-        let folder = pkg_config::get_variable("libopenjp2", "libdir")?;
-        println!("cargo:rustc-link-search=native={folder}");
-        Ok(())
-    });
-    if let Err(error) = found {
+    // GDAL is configured with the headers of the system, and linked with the archive that
+    // `openjpeg-sys` compiles.
+    if let Err(error) = pkg_config::Config::new().cargo_metadata(false).probe("libopenjp2") {
         panic!(
             "OpenJPEG was not found, which the static build needs: install its development package (Debian, \
              Ubuntu: apt-get install libopenjp2-7-dev pkg-config)\n{error}"

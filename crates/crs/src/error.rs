@@ -63,17 +63,25 @@ pub enum CrsError {
     /// The geoid grid that is needed is not installed.
     #[error(
         "heights above {datum} need {}, which PROJ does not find: put the file into one of the folders that PROJ \
-         searches ({}); PROJ's tool projsync fetches grids by their names, and https://cdn.proj.org has them all",
+         searches ({}), or allow grids to be fetched from https://cdn.proj.org",
         grids(.candidates),
         listed(.folders)
     )]
     MissingGrid {
         /// The datum requested.
         datum: String,
-        /// The file names that were tried.
-        candidates: String,
+        /// The names of the files, any of which serves; empty where PROJ's database names none.
+        candidates: Vec<String>,
         /// The folders that PROJ searches.
         folders: Vec<PathBuf>,
+    },
+    /// The geoid grid that is needed is not installed and cannot be fetched.
+    #[error("the geoid grid {name}, which PROJ does not find, cannot be fetched: {reason}")]
+    GridNotFetched {
+        /// Name of the file.
+        name: String,
+        /// What failed, in words.
+        reason: String,
     },
     /// The given geoid grid cannot be used.
     #[error(
@@ -100,7 +108,10 @@ fn listed(folders: &[PathBuf]) -> String {
 }
 
 /// Names the grids of a list, which any of them serves.
-fn grids(candidates: &str) -> String {
-    let kind = if candidates.contains(", ") { "one of the geoid grids" } else { "the geoid grid" };
-    format!("{kind} {candidates}")
+fn grids(candidates: &[String]) -> String {
+    match candidates {
+        [] => "a geoid grid that PROJ's tool projinfo names".to_owned(),
+        [one] => format!("the geoid grid {one}"),
+        several => format!("one of the geoid grids {}", several.join(", ")),
+    }
 }

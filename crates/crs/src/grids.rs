@@ -1,9 +1,11 @@
-//! The geoid grids that a transformation needs, and the folders in which PROJ looks for them.
+//! The geoid grids that a transformation needs, the folders in which PROJ looks for them, and how
+//! a missing one is fetched where the user allows it.
 #![allow(unsafe_code)]
 
 use std::ffi::c_char;
 use std::path::{Path, PathBuf};
 use std::ptr;
+use std::sync::{Mutex, OnceLock, PoisonError};
 
 use proj_sys::{
     PJ, PROJ_GRID_AVAILABILITY_USE_PROJ_GRID_AVAILABILITY_IGNORED,
@@ -14,10 +16,40 @@ use proj_sys::{
     proj_operation_factory_context_set_grid_availability_use, proj_operation_factory_context_set_spatial_criterion,
 };
 
+use crate::CrsError;
 use crate::proj_handle::{Context, text_of};
 
 /// Most grids that are named: a datum of a continent has one for each region.
-const NAMED_MAX: usize = 3;
+pub(crate) const NAMED_MAX: usize = 3;
+
+/// Puts the grid of a name into a folder, which may not exist yet, or says why it cannot.
+pub type GridSource = fn(name: &str, folder: &Path) -> Result<(), String>;
+
+static SOURCE: OnceLock<GridSource> = OnceLock::new();
+
+/// Lets converters of heights get grids that PROJ does not find from a source, for the rest of the
+/// process. The source that was set first stays. Without one, a missing grid is an error.
+pub fn get_missing_grids_from(source: GridSource) {
+    SOURCE.get_or_init(|| source);
+}
+
+/// Gets a grid from the source that the process allows; `false` where it allows none.
+///
+/// # Errors
+/// [`CrsError::GridNotFetched`].
+pub(crate) fn fetch(name: &str) -> Result<bool, CrsError> {
+    /// One thread fetches, and the others wait and find the grid.
+    static FETCHING: Mutex<()> = Mutex::new(());
+    let Some(source) = SOURCE.get() else { return Ok(false) };
+    let failed = |reason: String| CrsError::GridNotFetched { name: name.to_owned(), reason };
+    // The first folder is the user's own, the only one that can be written to without more rights.
+    let folder = folders().into_iter().next().ok_or_else(|| failed("PROJ has no folder for grids".to_owned()))?;
+    let _guard = FETCHING.lock().unwrap_or_else(PoisonError::into_inner);
+    if !folder.join(name).exists() {
+        source(name, &folder).map_err(failed)?;
+    }
+    Ok(true)
+}
 
 /// Returns the folders in which PROJ looks for grids, in its order: that of the user, those of
 /// `PROJ_DATA` (in older releases `PROJ_LIB`), and that of its database.

@@ -46,7 +46,7 @@ pub struct HeightConverter {
 
 impl HeightConverter {
     /// Makes the converter of a datum, with the grids that PROJ finds (its folder, `PROJ_DATA`,
-    /// `PROJ_LIB`).
+    /// `PROJ_LIB`), or that [`crate::get_missing_grids_from`] lets be fetched.
     ///
     /// ```
     /// use crs::{HeightConverter, VerticalDatum};
@@ -57,19 +57,24 @@ impl HeightConverter {
     /// ```
     ///
     /// # Errors
-    /// [`CrsError::MissingGrid`] when the geoid's grid is not installed;
+    /// [`CrsError::MissingGrid`] when the geoid's grid is not installed, and
+    /// [`CrsError::GridNotFetched`] when it cannot be fetched either;
     /// [`CrsError::NotVertical`] for the EPSG code of another kind of CRS;
     /// [`CrsError::NoTransformation`] when PROJ has no transformation from the ellipsoid to the
     /// EPSG code.
     pub fn new(datum: VerticalDatum) -> Result<Self, CrsError> {
         let metres_per_unit = datum.metres_per_unit().unwrap_or(1.0);
-        let pool = match datum {
-            VerticalDatum::Ellipsoid => None,
-            VerticalDatum::Egm96 => Some(first_grid(datum, &EGM96_GRIDS)?),
-            VerticalDatum::Egm2008 => Some(first_grid(datum, &EGM2008_GRIDS)?),
-            VerticalDatum::Epsg(code) => Some(through_database(code)?),
-        };
-        Ok(Self { datum, pool, metres_per_unit })
+        let mut pool = installed(datum);
+        // A datum of PROJ's database may work with the second of its grids only.
+        for _ in 0..grids::NAMED_MAX {
+            let Err(CrsError::MissingGrid { candidates, .. }) = &pool else { break };
+            let Some(name) = candidates.first() else { break };
+            if !grids::fetch(name)? {
+                break;
+            }
+            pool = installed(datum);
+        }
+        Ok(Self { datum, pool: pool?, metres_per_unit })
     }
 
     /// Makes the converter of a datum with a given geoid grid (GTX or GeoTIFF).
@@ -174,12 +179,22 @@ impl HeightConverter {
     }
 }
 
+/// Returns the transformation to a datum with the grids that are installed.
+fn installed(datum: VerticalDatum) -> Result<Option<Pool>, CrsError> {
+    match datum {
+        VerticalDatum::Ellipsoid => Ok(None),
+        VerticalDatum::Egm96 => first_grid(datum, &EGM96_GRIDS).map(Some),
+        VerticalDatum::Egm2008 => first_grid(datum, &EGM2008_GRIDS).map(Some),
+        VerticalDatum::Epsg(code) => through_database(code).map(Some),
+    }
+}
+
 /// Opens the first grid of a list that PROJ can read.
 fn first_grid(datum: VerticalDatum, names: &[&str]) -> Result<Pool, CrsError> {
     names
         .iter()
         .find_map(|name| Pool::new(Recipe::Pipeline(grid_pipeline(name))).ok())
-        .ok_or_else(|| missing(datum, names.join(", ")))
+        .ok_or_else(|| missing(datum, names.iter().map(|name| (*name).to_owned()).collect()))
 }
 
 /// Returns the PROJ pipeline that subtracts the grid's value at a longitude and latitude in degrees
@@ -202,29 +217,23 @@ fn through_database(code: u32) -> Result<Pool, CrsError> {
     }
     let target = format!("EPSG:4326+{code}");
     let recipe = Recipe::Spatial { source: "EPSG:4979".to_owned(), target: target.clone() };
-    let known = GRIDS.iter().find(|(known, _)| *known == code).map(|(_, name)| (*name).to_owned());
-    let wanted = || known.clone().or_else(|| names_of(&grids::missing_between("EPSG:4979", &target)));
-    let datum = VerticalDatum::Epsg(code);
-    let pool = match Pool::new(recipe) {
-        Ok(pool) => pool,
-        Err(reason) => {
-            return Err(wanted().map_or_else(|| no_transformation(&target, reason), |grids| missing(datum, grids)));
-        }
+    let wanted = || match GRIDS.iter().find(|(known, _)| *known == code) {
+        Some((_, name)) => vec![(*name).to_owned()],
+        None => grids::missing_between("EPSG:4979", &target),
     };
+    let datum = VerticalDatum::Epsg(code);
+    let without = |reason| match wanted() {
+        names if names.is_empty() => no_transformation(&target, reason),
+        names => missing(datum, names),
+    };
+    let pool = Pool::new(recipe).map_err(without)?;
     match AreaOfUse::of_epsg(code) {
-        Ok(Some(area)) if !converts_somewhere(&pool, &area) => {
-            let unknown = || format!("that `projinfo -s EPSG:4979 -t {target}` names");
-            Err(missing(datum, wanted().unwrap_or_else(unknown)))
-        }
+        Ok(Some(area)) if !converts_somewhere(&pool, &area) => Err(missing(datum, wanted())),
         _ => Ok(pool),
     }
 }
 
-fn names_of(grids: &[String]) -> Option<String> {
-    (!grids.is_empty()).then(|| grids.join(", "))
-}
-
-fn missing(datum: VerticalDatum, candidates: String) -> CrsError {
+fn missing(datum: VerticalDatum, candidates: Vec<String>) -> CrsError {
     CrsError::MissingGrid { datum: datum.to_string(), candidates, folders: grids::folders() }
 }
 

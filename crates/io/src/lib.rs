@@ -11,6 +11,7 @@ pub mod camera_file;
 pub mod colmap;
 pub mod coloured_mesh;
 pub mod control;
+mod download;
 mod geoparquet;
 pub mod gltf;
 pub mod ground_points;
@@ -32,4 +33,5 @@ pub mod transforms;
 pub mod vectors;
 
 pub use atomic::{SaveError, write_bytes};
+pub use download::download;
 pub use regular::{open as open_regular, read_regular, read_regular_text};

@@ -1,9 +1,12 @@
 //! Every job of the toolkit as a function from a configuration to a report, and [`batch`], which
 //! does many of them.
 //!
+//! [`align_page`] puts the alignment by hand behind a page of the viewer.
+//!
 //! The jobs live in crates of their own, by what they work on: `dsm`, `surfaces`, `scenes` and
 //! `viewer`. What they share is in `job`. All of them are re-exported here.
 
+pub mod align_page;
 pub mod batch;
 pub mod selftest;
 

@@ -213,7 +213,7 @@ fn geoids() -> Result<(SelftestState, String), String> {
         _ => (
             SelftestState::Absent,
             format!(
-                "no grid of {}; heights above the ellipsoid need none, and projsync of PROJ fetches grids",
+                "no grid of {}; heights above the ellipsoid need none, and --fetch-grids fetches a grid",
                 names(&absent)
             ),
         ),

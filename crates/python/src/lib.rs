@@ -57,12 +57,20 @@ fn allow_remote() {
     jobs::remote::allow_remote();
 }
 
+/// Lets geoid grids that PROJ does not find be fetched from <https://cdn.proj.org>, once, into
+/// PROJ's folder of the user.
+#[pyfunction]
+fn fetch_grids() {
+    jobs::remote::fetch_grids();
+}
+
 #[pymodule(gil_used = false)]
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     forked::note_process();
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add_function(wrap_pyfunction!(run_job, module)?)?;
     module.add_function(wrap_pyfunction!(allow_remote, module)?)?;
+    module.add_function(wrap_pyfunction!(fetch_grids, module)?)?;
     module.add_function(wrap_pyfunction!(height_sweep::sweep_views, module)?)?;
     module.add_function(wrap_pyfunction!(rasters::write_grid, module)?)?;
     module.add_function(wrap_pyfunction!(rasters::read_grid, module)?)?;

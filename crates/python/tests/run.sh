@@ -15,25 +15,10 @@ skip() {
 target=${CARGO_TARGET_DIR:-target}
 library=$target/debug/deps/lib_native.so
 [ -e "$library" ] || skip "$library is not there: run 'cargo test --workspace --no-run' first"
-python=${PYTHON:-python3}
-command -v "$python" > /dev/null || skip "$python is not installed"
-"$python" -c 'import sys; sys.exit(sys.version_info < (3, 9))' || skip "Python is older than 3.9"
-
-venv=$target/python/venv
-stamp=$venv/made
-optional="distributed tqdm xarray shapely matplotlib rasterio rioxarray geopandas pyproj pyarrow"
-wanted="numpy pytest mypy; $optional"
-if [ "$(cat "$stamp" 2> /dev/null)" != "$wanted" ]; then
-  rm -rf "$venv"
-  "$python" -m venv "$venv" > /dev/null 2>&1 || skip "a virtual environment cannot be made (python3-venv)"
-  pip=("$venv/bin/python" -m pip install --quiet --disable-pip-version-check --retries 1 --timeout 30)
-  "${pip[@]}" numpy pytest mypy 2> /dev/null || skip "numpy, pytest and mypy cannot be installed"
-  # shellcheck disable=SC2086
-  "${pip[@]}" $optional 2> /dev/null || echo "skipped: tests with $optional, which cannot be installed"
-  echo "$wanted" > "$stamp"
-fi
+said=$(crates/python/tests/environment.sh) || skip "$said"
+[ -z "$said" ] || echo "$said"
 
 PYTHONPATH=$(crates/python/tests/site.sh)
 export PYTHONPATH PYTHONDONTWRITEBYTECODE=1
 export SKYSWEEP_COMMAND=${SKYSWEEP_COMMAND:-$(realpath "$target")/debug/skysweep}
-exec "$venv/bin/python" -m pytest -q -p no:cacheprovider crates/python/tests "$@"
+exec "$target/python/venv/bin/python" -m pytest -q -p no:cacheprovider crates/python/tests "$@"

@@ -77,6 +77,7 @@ def every_job() -> list[float | int | str | None]:
     reported += [heights, points, tiles, ground, both, priors, splats, rendered, converted, trained, mesh, aligned]
     reported += [split, city, triangles, rpc, written, scene, *faults]
     skysweep.allow_remote()
+    skysweep.fetch_grids()
     return [first, kept[0], residual, plan.id, chunk, wanted, state, left_out, mae, rest, kind, len(reported), str(void)]
 
 

@@ -12,6 +12,7 @@
 //! | `vectors/NUMBER.json` | features of a layer of vectors in the units of the map |
 //! | `at?x&y` | values of all rasters at a position |
 //! | `profile?rasters&x1&y1&x2&y2` | values of rasters along a line |
+//! | `job/NAME` | what a job behind the page has under a name; a POST asks it to do something |
 //!
 //! A grid begins with its columns and rows (u32), followed by f32 in rows; all little-endian, NaN
 //! is no-data. Values are those of the cells of the raster, never interpolated.
@@ -21,8 +22,9 @@ use raster::{Grid, Window};
 use report::{MapStyle, png_with_alpha};
 use serde::Serialize;
 
-use super::files::{SPACE, file};
+use super::files::{ALIGN, SPACE, file};
 use super::http::{Answer, BINARY, Refusal};
+use super::page_job::{PageData, PageJob};
 use super::query::{Query, whole};
 use super::scene::{SIDE_MAX, Scene, SceneLayer, SceneRaster, TILE, reduced};
 use super::space::Space;
@@ -39,6 +41,7 @@ const PROFILE_CELLS: usize = 1 << 16;
 pub(super) struct Answers<'a> {
     scene: &'a Scene,
     space: &'a Space,
+    job: Option<&'a dyn PageJob>,
     /// Rasters that were used so far, by their numbers.
     open: Vec<Option<ImageSource>>,
 }
@@ -61,8 +64,8 @@ struct Profile {
 }
 
 impl<'a> Answers<'a> {
-    pub(super) fn new(scene: &'a Scene, space: &'a Space) -> Self {
-        Self { scene, space, open: scene.rasters.iter().map(|_| None).collect() }
+    pub(super) fn new(scene: &'a Scene, space: &'a Space, job: Option<&'a dyn PageJob>) -> Self {
+        Self { scene, space, job, open: scene.rasters.iter().map(|_| None).collect() }
     }
 
     /// Answers the part of an address after the token.
@@ -71,9 +74,18 @@ impl<'a> Answers<'a> {
     /// [`Refusal::NotFound`], [`Refusal::Malformed`], [`Refusal::Failed`].
     pub(super) fn answer(&mut self, path: &str, query: &str) -> Result<Answer, Refusal> {
         // Without rasters, the page of splats is the only one.
-        let page = if path.is_empty() && self.scene.rasters.is_empty() { SPACE } else { path };
+        let page = match path {
+            "" if self.job.is_some() => ALIGN,
+            "" if self.scene.rasters.is_empty() => SPACE,
+            ALIGN if self.job.is_none() => return Err(Refusal::NotFound),
+            path => path,
+        };
         if let Some(answer) = file(page) {
             return Ok(answer);
+        }
+        if let Some(name) = path.strip_prefix("job/") {
+            let found = self.job.and_then(|job| job.get(name)).ok_or(Refusal::NotFound)?;
+            return found.map(Answer::from).map_err(Refusal::Failed);
         }
         let query = Query::new(query);
         let parts: Vec<&str> = path.splitn(6, '/').collect();
@@ -89,6 +101,16 @@ impl<'a> Answers<'a> {
             ["profile"] => self.profile(&query),
             _ => Err(Refusal::NotFound),
         }
+    }
+
+    /// Passes the body of a POST to the job behind the page. What it refuses is told in its words.
+    ///
+    /// # Errors
+    /// [`Refusal::NotFound`], [`Refusal::Malformed`].
+    pub(super) fn post(&self, path: &str, body: &[u8]) -> Result<Answer, Refusal> {
+        let name = path.strip_prefix("job/").ok_or(Refusal::NotFound)?;
+        let found = self.job.and_then(|job| job.post(name, body)).ok_or(Refusal::NotFound)?;
+        found.map(|text| PageData::Json(text).into()).map_err(Refusal::Malformed)
     }
 
     fn vectors(&self, number: &str) -> Result<Answer, Refusal> {

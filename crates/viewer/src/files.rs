@@ -5,7 +5,7 @@ use hyper::body::Bytes;
 use super::http::Answer;
 
 /// Files of the page by their names in the address: name, type, content.
-const FILES: [(&str, &str, &str); 16] = [
+const FILES: [(&str, &str, &str); 23] = [
     ("", HTML, include_str!("page/index.html")),
     ("style.css", "text/css; charset=utf-8", include_str!("page/style.css")),
     ("main.js", SCRIPT, include_str!("page/main.js")),
@@ -22,11 +22,21 @@ const FILES: [(&str, &str, &str); 16] = [
     ("space/splats.js", SCRIPT, include_str!("page/space/splats.js")),
     ("space/sort.js", SCRIPT, include_str!("page/space/sort.js")),
     ("space/mesh.js", SCRIPT, include_str!("page/space/mesh.js")),
+    (ALIGN, HTML, include_str!("page/align/index.html")),
+    ("align/align.css", "text/css; charset=utf-8", include_str!("page/align/align.css")),
+    ("align/main.js", SCRIPT, include_str!("page/align/main.js")),
+    ("align/clouds.js", SCRIPT, include_str!("page/align/clouds.js")),
+    ("align/similarity.js", SCRIPT, include_str!("page/align/similarity.js")),
+    ("align/dots.js", SCRIPT, include_str!("page/align/dots.js")),
+    ("align/views.js", SCRIPT, include_str!("page/align/views.js")),
 ];
 const SCRIPT: &str = "text/javascript; charset=utf-8";
 const HTML: &str = "text/html; charset=utf-8";
 /// Name of the page of splats and meshes.
 pub(super) const SPACE: &str = "space.html";
+
+/// Name of the page of the alignment by hand.
+pub(super) const ALIGN: &str = "align.html";
 
 /// Returns the file of a name.
 pub(super) fn file(name: &str) -> Option<Answer> {

@@ -1,17 +1,18 @@
 //! Requests and responses of HTTP/1.1, one per connection, within fixed bounds. `hyper` reads and
 //! writes them.
 //!
-//! A head has at most 16 KiB, 64 fields and five seconds. A body is not read. Connections wait for
-//! their clients without a thread, so that slow ones keep nobody from being answered.
+//! A head has at most 16 KiB, 64 fields and five seconds. A body is read only where a job behind
+//! the page takes some, and has at most 256 KiB. Connections wait for their clients without a
+//! thread, so that slow ones keep nobody from being answered.
 
 use std::convert::Infallible;
 use std::future::poll_fn;
 use std::sync::Arc;
 use std::time::Duration;
 
-use http_body_util::Full;
+use http_body_util::{BodyExt, Full, Limited};
 use hyper::body::{Bytes, Incoming};
-use hyper::header::{ALLOW, CONTENT_LENGTH, CONTENT_TYPE, HOST, HeaderName, HeaderValue};
+use hyper::header::{ALLOW, CONTENT_LENGTH, CONTENT_TYPE, HOST, HeaderName, HeaderValue, ORIGIN};
 use hyper::server::conn::http1::Builder;
 use hyper::service::service_fn;
 use hyper::{Method, Response, StatusCode};
@@ -38,6 +39,10 @@ const PAUSE: Duration = Duration::from_millis(50);
 /// socket that is closed with unread bytes would take the response back.
 const REST_PARTS: usize = 512;
 const REST_TIME: Duration = Duration::from_secs(1);
+/// Longest body of a request, bytes.
+const BODY_MAX: usize = 256 << 10;
+/// Type of the bodies that are taken. No form of a foreign page can send it.
+const BODY_KIND: &str = "application/json";
 
 /// Fields of every response. The page loads nothing from elsewhere and is shown in no frame; its
 /// address, which holds the token, is told to nobody.
@@ -66,6 +71,8 @@ pub(super) struct Request {
     pub(super) target: String,
     /// The field `Host`.
     pub(super) host: String,
+    /// The body of a POST.
+    pub(super) posted: Option<Bytes>,
 }
 
 /// A request, and where its answer is expected.
@@ -93,7 +100,7 @@ pub(super) enum Refusal {
     ForeignHost,
     /// There is nothing under this address, or the token is wrong.
     NotFound,
-    /// The method is neither GET nor HEAD.
+    /// The method is neither GET nor HEAD, nor a POST where there is a job that takes some.
     Method,
     /// The data cannot be read.
     Failed(String),
@@ -118,13 +125,14 @@ impl Refusal {
     }
 }
 
-/// Accepts connections and passes their requests on, until `is_over`.
+/// Accepts connections and passes their requests on, until `is_over`. Bodies are read if `posts`.
 ///
 /// # Errors
 /// The error of the system when the listener cannot be used.
 pub(super) async fn serve(
     listener: std::net::TcpListener,
     questions: mpsc::UnboundedSender<Question>,
+    posts: bool,
     is_over: impl Fn() -> bool,
 ) -> std::io::Result<()> {
     listener.set_nonblocking(true)?;
@@ -141,7 +149,7 @@ pub(super) async fn serve(
                 let (taken, questions) = (place.take(), questions.clone());
                 tokio::spawn(async move {
                     // A client that is too slow has lost its connection.
-                    let _ = timeout(CONNECTION_TIME, converse(stream, questions)).await;
+                    let _ = timeout(CONNECTION_TIME, converse(stream, questions, posts)).await;
                     drop(taken);
                 });
             }
@@ -154,8 +162,8 @@ pub(super) async fn serve(
 }
 
 /// Answers the request of one connection.
-async fn converse(stream: TcpStream, questions: mpsc::UnboundedSender<Question>) {
-    let service = service_fn(|request| Box::pin(answer(request, questions.clone())));
+async fn converse(stream: TcpStream, questions: mpsc::UnboundedSender<Question>, posts: bool) {
+    let service = service_fn(|request| Box::pin(answer(request, questions.clone(), posts)));
     let mut builder = Builder::new();
     builder.timer(TokioTimer::new()).header_read_timeout(HEAD_TIME);
     builder
@@ -184,20 +192,22 @@ async fn converse(stream: TcpStream, questions: mpsc::UnboundedSender<Question>)
 async fn answer(
     request: hyper::Request<Incoming>,
     questions: mpsc::UnboundedSender<Question>,
+    posts: bool,
 ) -> Result<Response<Full<Bytes>>, Infallible> {
     let (reply, answer) = oneshot::channel();
     let is_head = request.method() == Method::HEAD;
     let ends = || Refusal::Failed("the viewer ends".to_owned());
-    let answer = match questions.send(Question { request: checked(&request), reply }) {
+    let answer = match questions.send(Question { request: checked(request, posts).await, reply }) {
         Ok(()) => answer.await.unwrap_or_else(|_| Err(ends())),
         Err(_) => Err(ends()),
     };
-    Ok(response(answer, is_head))
+    Ok(response(answer, is_head, posts))
 }
 
 /// Returns what a request asks for.
-fn checked(request: &hyper::Request<Incoming>) -> Result<Request, Refusal> {
-    if ![Method::GET, Method::HEAD].contains(request.method()) {
+async fn checked(request: hyper::Request<Incoming>, posts: bool) -> Result<Request, Refusal> {
+    let is_post = posts && request.method() == Method::POST;
+    if !is_post && ![Method::GET, Method::HEAD].contains(request.method()) {
         return Err(Refusal::Method);
     }
     let mut hosts = request.headers().get_all(HOST).iter();
@@ -208,10 +218,25 @@ fn checked(request: &hyper::Request<Incoming>) -> Result<Request, Refusal> {
         return Err(Refusal::NotFound);
     }
     let target = request.uri().path_and_query().ok_or(Refusal::NotFound)?.as_str().to_owned();
-    Ok(Request { target, host })
+    let posted = if is_post { Some(body(request, &host).await?) } else { None };
+    Ok(Request { target, host, posted })
 }
 
-fn response(answer: Result<Answer, Refusal>, is_head: bool) -> Response<Full<Bytes>> {
+/// Reads the body of a POST that the own page sends. A browser says where a request comes from.
+async fn body(request: hyper::Request<Incoming>, host: &str) -> Result<Bytes, Refusal> {
+    let own = format!("http://{host}");
+    if request.headers().get_all(ORIGIN).iter().any(|origin| origin.as_bytes() != own.as_bytes()) {
+        return Err(Refusal::ForeignHost);
+    }
+    if request.headers().get(CONTENT_TYPE).is_none_or(|kind| kind.as_bytes() != BODY_KIND.as_bytes()) {
+        return Err(Refusal::Malformed(format!("the type of the body is not {BODY_KIND}")));
+    }
+    let read = Limited::new(request.into_body(), BODY_MAX).collect().await;
+    let too_long = |_| Refusal::Malformed(format!("the body cannot be read, or is longer than {BODY_MAX} bytes"));
+    Ok(read.map_err(too_long)?.to_bytes())
+}
+
+fn response(answer: Result<Answer, Refusal>, is_head: bool, posts: bool) -> Response<Full<Bytes>> {
     let (status, kind, body) = match answer {
         Ok(answer) => (StatusCode::OK, answer.kind, answer.body),
         Err(refusal) => {
@@ -233,7 +258,7 @@ fn response(answer: Result<Answer, Refusal>, is_head: bool) -> Response<Full<Byt
     fields.insert(CONTENT_TYPE, HeaderValue::from_static(kind));
     fields.insert(CONTENT_LENGTH, HeaderValue::from(length));
     if status == StatusCode::METHOD_NOT_ALLOWED {
-        fields.insert(ALLOW, HeaderValue::from_static("GET, HEAD"));
+        fields.insert(ALLOW, HeaderValue::from_static(if posts { "GET, HEAD, POST" } else { "GET, HEAD" }));
     }
     response
 }

@@ -8,7 +8,8 @@
 //!   nothing is answered. The header `Host` must name this computer, so that the page of a foreign
 //!   site cannot reach it under a name of its own (DNS rebinding).
 //! - GET and HEAD are answered, nothing else. Nothing of a request becomes the name of a file:
-//!   layers have numbers.
+//!   layers have numbers. Only where a job stands behind the page ([`PageJob`]), a POST from the
+//!   page itself is passed to it.
 //! - A request, its time and the work that it asks for are bounded, and so is the number of
 //!   connections and of requests that are answered at once. A raster of which one picture would
 //!   take long, because it has no overviews, is refused.
@@ -22,8 +23,10 @@ mod answers;
 mod config;
 mod error;
 mod files;
+mod frame;
 mod http;
 mod packed;
+mod page_job;
 mod query;
 mod rasters;
 mod report;
@@ -35,5 +38,7 @@ mod vectors;
 
 pub use config::ViewConfig;
 pub use error::ViewError;
+pub use frame::MapFrame;
+pub use page_job::{PageData, PageJob};
 pub use report::ViewerReport;
 pub use server::ViewServer;

@@ -64,7 +64,7 @@ pub(super) struct MapSystem {
     /// Name for people, with its EPSG code.
     name: String,
     /// Vertical datum of heights, where it is known.
-    vertical: Option<String>,
+    pub(super) vertical: Option<String>,
     /// Unit of positions.
     unit: &'static str,
     /// Metres in a unit along x and y.
@@ -72,9 +72,9 @@ pub(super) struct MapSystem {
     #[serde(skip)]
     pub(super) wkt: Option<String>,
     #[serde(skip)]
-    epsg: Option<u32>,
+    pub(super) epsg: Option<u32>,
     /// Whether the rasters have a georeference.
-    is_placed: bool,
+    pub(super) is_placed: bool,
 }
 
 /// A raster on the map.
@@ -173,6 +173,11 @@ impl Scene {
         scene.folders = config.inputs.iter().filter(|input| input.is_dir()).count();
         scene.add_vectors(config, progress)?;
         Ok(scene)
+    }
+
+    /// The first raster with heights.
+    pub(super) fn heights(&self) -> Option<&SceneRaster> {
+        self.layers.iter().find(|layer| layer.is_height).and_then(|layer| self.rasters.get(layer.raster))
     }
 
     /// Adds the vectors of the inputs. Those that are only found in a folder may be left out.
@@ -321,7 +326,7 @@ impl SceneLayer {
 
 impl MapSystem {
     /// Returns the system of a raster. One that PROJ cannot read is kept by its name.
-    fn of(source: &ImageSource) -> Result<Self, RasterError> {
+    pub(super) fn of(source: &ImageSource) -> Result<Self, RasterError> {
         let info = source.info();
         let wkt = info.crs_wkt.clone();
         let is_placed = info.geotransform.is_some();

@@ -14,7 +14,9 @@ use tokio::sync::mpsc;
 use super::answers::Answers;
 use super::config::ViewConfig;
 use super::error::ViewError;
+use super::frame::MapFrame;
 use super::http::{Answer, Question, Refusal, Request, serve};
+use super::page_job::PageJob;
 use super::report::ViewerReport;
 use super::scene::Scene;
 use super::space::Space;
@@ -88,11 +90,32 @@ impl ViewServer {
         command.spawn().map(drop).map_err(ViewError::Browser)
     }
 
+    /// Returns the frame of the map, and its ground as far as its rasters have heights.
+    ///
+    /// # Errors
+    /// [`ViewError::Raster`] when the heights cannot be read.
+    pub fn map_frame(&self) -> Result<Option<MapFrame>, ViewError> {
+        Ok(MapFrame::of(&self.scene)?)
+    }
+
     /// Answers requests until the job is cancelled or the time of the configuration is over.
     ///
     /// # Errors
     /// [`ViewError::Thread`] when the system starts no threads.
     pub fn serve(&self, progress: &dyn Progress) -> Result<ViewerReport, ViewError> {
+        self.answer_all(None, progress)
+    }
+
+    /// Answers as [`Self::serve`] does, with a page for a job behind it in the place of the map's
+    /// own.
+    ///
+    /// # Errors
+    /// As [`Self::serve`].
+    pub fn serve_job(&self, job: &dyn PageJob, progress: &dyn Progress) -> Result<ViewerReport, ViewError> {
+        self.answer_all(Some(job), progress)
+    }
+
+    fn answer_all(&self, job: Option<&dyn PageJob>, progress: &dyn Progress) -> Result<ViewerReport, ViewError> {
         let start = Instant::now();
         let counts = Counts::default();
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(ViewError::Thread)?;
@@ -101,10 +124,11 @@ impl ViewServer {
         let (questions, received) = mpsc::unbounded_channel();
         let received = Mutex::new(received);
         let served = std::thread::scope(|scope| {
-            let work = || self.work(&received, &counts);
+            let work = || self.work(job, &received, &counts);
             let spawn = |_| std::thread::Builder::new().name("view".to_owned()).spawn_scoped(scope, work);
             (0..WORKERS).try_for_each(|i| spawn(i).map(drop))?;
-            let served = runtime.block_on(serve(listener, questions, || progress.is_cancelled() || is_over()));
+            let served =
+                runtime.block_on(serve(listener, questions, job.is_some(), || progress.is_cancelled() || is_over()));
             // The connections end with the runtime, and the threads when no connection may ask.
             drop(runtime);
             served
@@ -121,8 +145,8 @@ impl ViewServer {
     }
 
     /// Answers one request after the other until no more can come.
-    fn work(&self, questions: &Mutex<mpsc::UnboundedReceiver<Question>>, counts: &Counts) {
-        let mut answers = Answers::new(&self.scene, &self.space);
+    fn work(&self, job: Option<&dyn PageJob>, questions: &Mutex<mpsc::UnboundedReceiver<Question>>, counts: &Counts) {
+        let mut answers = Answers::new(&self.scene, &self.space, job);
         let next = || questions.lock().unwrap_or_else(PoisonError::into_inner).blocking_recv();
         while let Some(question) = next() {
             let request = question.request.clone();
@@ -148,7 +172,10 @@ impl ViewServer {
         if !is_same(token, &self.token) {
             return Err(Refusal::NotFound);
         }
-        answers.answer(path, query)
+        match &request.posted {
+            Some(body) => answers.post(path, body),
+            None => answers.answer(path, query),
+        }
     }
 }
 

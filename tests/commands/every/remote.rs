@@ -7,7 +7,11 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use crate::common::{sample, skysweep};
+use crs::Crs;
+use io::raster::{Band, BandData, CogRaster, write_cog};
+use predicates::prelude::PredicateBooleanExt as _;
 use predicates::str::contains;
+use raster::{GeoTransform, Grid};
 
 /// Serves files by name, whole or in parts, and notes which were asked for.
 fn server(files: Vec<(&'static str, Vec<u8>)>) -> (u16, Arc<Mutex<Vec<String>>>) {
@@ -165,4 +169,45 @@ fn servers_neither_lead_elsewhere_nor_stall() {
     let start = Instant::now();
     evaluate("stall").code(2).stderr(contains("did not answer in time"));
     assert!(start.elapsed() < Duration::from_secs(5), "{:?}", start.elapsed());
+}
+
+/// A geoid grid that is not installed is fetched where the user says so, once, from the address
+/// that PROJ's variable names.
+#[test]
+fn grids_are_fetched_only_when_the_user_says_so() {
+    const UNDULATION_M: f32 = 5.25;
+    let folder = tempfile::tempdir().unwrap();
+    let grid = folder.path().join("undulation.tif");
+    // One degree around the town, in steps of a tenth.
+    let values = Grid::filled(10, 10, UNDULATION_M);
+    let bands = [Band { description: "geoid_undulation", data: BandData::F32(&values) }];
+    let place = GeoTransform([4.9, 0.1, 0.0, 44.0, 0.0, -0.1]);
+    let raster = CogRaster { holds_heights: false, ..CogRaster::new(&bands, place, Crs::ellipsoidal(4326)) };
+    write_cog(&grid, &raster, false).unwrap();
+    let (port, asked) = server(vec![("/us_nga_egm08_25.tif", std::fs::read(&grid).unwrap())]);
+
+    let reference = sample("truth/dsm.tif");
+    let user = folder.path().join("proj");
+    let evaluate = |endpoint: &str, options: &[&str]| {
+        let mut command = skysweep();
+        command.env("PROJ_USER_WRITABLE_DIRECTORY", &user).env("PROJ_NETWORK_ENDPOINT", endpoint);
+        command.arg("eval").arg(&reference).arg(&reference).args(["--test-vertical", "egm2008", "--align", "none"]);
+        command.args(["--no-report", "--json"]).args(options).assert()
+    };
+    let here = format!("http://127.0.0.1:{port}");
+    evaluate(&here, &[]).code(2).stderr(contains("us_nga_egm08_25.tif").and(contains("--fetch-grids")));
+    assert!(asked.lock().unwrap().is_empty() && !user.exists(), "nothing is asked for without leave");
+
+    let elsewhere = format!("{here}/elsewhere");
+    evaluate(&elsewhere, &["--fetch-grids"]).code(2).stderr(contains("404").and(contains("us_nga_egm08_25.tif")));
+    assert_eq!(std::fs::read_dir(&user).unwrap().count(), 0, "nothing is left of what was not found");
+
+    let told = evaluate(&here, &["--fetch-grids"]).code(0).stderr(contains("fetched").and(contains(&here)));
+    let report: serde_json::Value = serde_json::from_slice(&told.get_output().stdout).unwrap();
+    let median_m = report["metrics"]["median"].as_f64().unwrap();
+    assert!((median_m - f64::from(UNDULATION_M)).abs() < 0.01, "{median_m}");
+
+    let requests = asked.lock().unwrap().len();
+    evaluate(&here, &[]).code(0);
+    assert_eq!(asked.lock().unwrap().len(), requests, "the grid is kept");
 }

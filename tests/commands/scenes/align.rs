@@ -172,3 +172,28 @@ fn what_cannot_be_aligned_is_said() {
     let again = skysweep().arg("align").arg(reference("model")).arg("--gps").arg(&gps).arg("-o").arg(&out).assert();
     again.code(2).stderr(predicate::str::contains("--overwrite"));
 }
+
+/// The page ends after its time. Without a save it has not done what it was started for.
+#[test]
+fn a_page_over_a_map_takes_the_place_of_positions() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let town = Path::new(env!("CARGO_MANIFEST_DIR")).join("data-samples/town");
+    let by_hand = |more: &[&str]| {
+        let mut command = skysweep();
+        command.arg("align").arg(reference("model")).arg("-o").arg(&out).args(more);
+        command.assert()
+    };
+    let map = town.join("truth/dsm.tif").display().to_string();
+    let ended = by_hand(&["--page", &map, "--for", "0.2"]).code(1);
+    let printed = String::from_utf8_lossy(&ended.get_output().stdout).into_owned();
+    assert!(printed.starts_with("http://127.0.0.1:") && printed.contains("saved      nothing"), "{printed}");
+    assert!(!out.exists(), "nothing was written");
+    by_hand(&[]).code(2).stderr(predicate::str::contains("--positions"));
+    by_hand(&["--open"]).code(2).stderr(predicate::str::contains("--page"));
+    by_hand(&["--page", &map, "--positions", "gps.csv"])
+        .code(2)
+        .stderr(predicate::str::contains("cannot be used with"));
+    let image = town.join("view_1.tif").display().to_string();
+    by_hand(&["--page", &image]).code(2).stderr(predicate::str::contains("no coordinate system"));
+}

@@ -64,6 +64,68 @@ pub fn camera_up(rotations: &[[[f64; 3]; 3]]) -> Option<CameraUp> {
     Some(CameraUp { direction: up.into(), spread_deg, sigma_deg: HELD_DEG })
 }
 
+/// Returns the least-squares similarity of pairs among those that turn a rotation about the
+/// vertical only: what `upright` turns up stays up. With x' = R₀ (x − x̄) and M = Σ (y − ȳ) x'ᵀ,
+/// the angle is atan2(M₁₀ − M₀₁, M₀₀ + M₁₁), and s = tr(Rᵀ M) / Σ |x'|².
+///
+/// # Errors
+/// [`AlignError::TooFew`] below two pairs, [`AlignError::NotFinite`], [`AlignError::Degenerate`]
+/// for pairs above one another, which determine no heading.
+///
+/// ```
+/// use colmap::align::{PointPair, fit_level};
+/// let pair = |x: f64, y: f64, z: f64| PointPair { source: [x, y, z], target: [-2.0 * y, 2.0 * x, 2.0 * z + 5.0] };
+/// let found = fit_level(&[pair(0.0, 0.0, 1.0), pair(10.0, 0.0, 1.5)], [[1., 0., 0.], [0., 1., 0.], [0., 0., 1.]])?;
+/// assert!((found.scale() - 2.0).abs() < 1e-9 && (found.rotation()[1][0] - 1.0).abs() < 1e-9);
+/// # Ok::<(), colmap::align::AlignError>(())
+/// ```
+pub fn fit_level(pairs: &[PointPair], upright: [[f64; 3]; 3]) -> Result<Similarity, AlignError> {
+    if pairs.len() < 2 {
+        return Err(AlignError::TooFew { found: pairs.len(), needed: 2 });
+    }
+    let is_finite = |p: &PointPair| p.source.iter().chain(&p.target).all(|c| c.is_finite());
+    if let Some(index) = pairs.iter().position(|pair| !is_finite(pair)) {
+        return Err(AlignError::NotFinite { index });
+    }
+    let base = Matrix3::from_fn(|i, j| upright[i][j]);
+    let count = pairs.len() as f64;
+    let source_mean = pairs.iter().map(|p| base * Vector3::from(p.source)).sum::<Vector3<f64>>() / count;
+    let target_mean = pairs.iter().map(|p| Vector3::from(p.target)).sum::<Vector3<f64>>() / count;
+    let (mut moment, mut source, mut flat, mut target) = (Matrix3::zeros(), 0.0, 0.0, 0.0);
+    for pair in pairs {
+        let x = base * Vector3::from(pair.source) - source_mean;
+        let y = Vector3::from(pair.target) - target_mean;
+        moment += y * x.transpose();
+        source += x.norm_squared();
+        flat += x.xy().norm_squared();
+        target += y.xy().norm_squared();
+    }
+    let degenerate = || AlignError::Degenerate { ratio: 0.0 };
+    let (across, along): (f64, f64) = (moment[(1, 0)] - moment[(0, 1)], moment[(0, 0)] + moment[(1, 1)]);
+    // The heading is that of horizontal distances; rounding must not be taken for one.
+    if !(across.hypot(along) > RATIO_MIN * (flat * target).sqrt() && flat > RATIO_MIN * source) {
+        return Err(degenerate());
+    }
+    let (sine, cosine) = across.atan2(along).sin_cos();
+    let turn = Matrix3::new(cosine, -sine, 0.0, sine, cosine, 0.0, 0.0, 0.0, 1.0);
+    let scale = (turn.transpose() * moment).trace() / source;
+    let rotation = turn * base;
+    let translation = target_mean - scale * (turn * source_mean);
+    let rows = [0, 1, 2].map(|i| [0, 1, 2].map(|j| rotation[(i, j)]));
+    Similarity::new(scale, rows, translation.into()).map_err(|_| degenerate())
+}
+
+/// Returns the normal of the plane through points near `middle`, on the side of `above`: the
+/// direction in which they spread least.
+pub fn plane_normal(points: impl Iterator<Item = [f64; 3]>, middle: [f64; 3], above: [f64; 3]) -> [f64; 3] {
+    // Far points count by their direction only, so that a few wild ones do not turn the plane.
+    let offset = points.map(|p| Vector3::from(p) - Vector3::from(middle)).filter(|d| d.norm() > 0.0);
+    let spread: Matrix3<f64> = offset.map(|d| d.normalize()).map(|d| d * d.transpose()).sum();
+    let found = SymmetricEigen::new(spread);
+    let normal = found.eigenvectors.column(found.eigenvalues.imin()).into_owned();
+    if normal.dot(&Vector3::from(above)) < 0.0 { (-normal).into() } else { normal.into() }
+}
+
 /// Fits a similarity to pairs whose positions have a standard deviation of `sigma_m` along each
 /// axis, and to the up direction of the model.
 pub(super) fn fit_with_up(pairs: &[PointPair], up: &CameraUp, sigma_m: f64) -> Result<Similarity, AlignError> {
@@ -96,4 +158,54 @@ pub(super) fn fit_with_up(pairs: &[PointPair], up: &CameraUp, sigma_m: f64) -> R
     let translation = target_mean - scale * (rotation * source_mean);
     let rows = [0, 1, 2].map(|i| [0, 1, 2].map(|j| rotation[(i, j)]));
     Similarity::new(scale, rows, translation.into()).map_err(|_| degenerate())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use camera::Pose;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn a_heading_comes_back_and_up_stays_up(
+            q in prop::array::uniform4(-1.0..1.0f64), heading in -3.1..3.1f64, scale in 0.01..100.0f64,
+            t in prop::array::uniform3(-1e3..1e3f64),
+            points in prop::collection::vec(prop::array::uniform3(-10.0..10.0f64), 2..6),
+        ) {
+            prop_assume!(q.iter().map(|c| c * c).sum::<f64>() > 0.1);
+            let upright = Pose::from_quaternion(q, [0.0; 3]).unwrap().rotation;
+            let (s, c) = heading.sin_cos();
+            let turn = Similarity::new(1.0, [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]], [0.0; 3]).unwrap();
+            let planted = Similarity::new(scale, turn.after(&Similarity::new(1.0, upright, [0.0; 3]).unwrap()).rotation(), t).unwrap();
+            let pairs: Vec<PointPair> = points.iter().map(|&source| PointPair { source, target: planted.apply(source) }).collect();
+            let (a, b) = (pairs[0].target, pairs[1].target);
+            prop_assume!((a[0] - b[0]).hypot(a[1] - b[1]) > 0.1 * scale);
+            let found = fit_level(&pairs, upright).unwrap();
+            prop_assert!((found.scale() / scale - 1.0).abs() < 1e-9);
+            prop_assert!(pairs.iter().all(|p| (0..3).all(|i| (found.apply(p.source)[i] - p.target[i]).abs() < 1e-6)));
+        }
+    }
+
+    #[test]
+    fn pairs_above_one_another_have_no_heading() {
+        let pair = |z: f64| PointPair { source: [1.0, 2.0, z], target: [5.0, 6.0, z] };
+        let level = Similarity::IDENTITY.rotation();
+        assert!(matches!(fit_level(&[pair(0.0), pair(3.0)], level), Err(AlignError::Degenerate { .. })));
+        assert!(matches!(fit_level(&[pair(0.0)], level), Err(AlignError::TooFew { found: 1, needed: 2 })));
+        let broken = PointPair { source: [f64::NAN; 3], target: [0.0; 3] };
+        assert!(matches!(fit_level(&[pair(0.0), broken], level), Err(AlignError::NotFinite { index: 1 })));
+    }
+
+    #[test]
+    fn the_normal_of_a_plane_is_on_the_side_of_the_cameras() {
+        let grid =
+            || (0..100).map(|i| [f64::from(i % 10) - 4.5, 0.3 * (f64::from(i / 10) - 4.5), f64::from(i / 10) - 4.5]);
+        let wild = std::iter::once([0.0, 1e6, -1e6]);
+        let expected = Vector3::new(0.0, 1.0, -0.3).normalize();
+        for above in [1.0, -1.0] {
+            let found = plane_normal(grid().chain(wild.clone()), [0.0; 3], [0.0, above, 0.0]);
+            assert!((Vector3::from(found) - above * expected).norm() < 0.05, "{found:?}");
+        }
+    }
 }

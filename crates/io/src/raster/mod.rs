@@ -35,3 +35,4 @@ pub use write::world_file::write_world_file;
 
 pub(crate) use access::gdal_access::{VectorFormat, register_vector};
 pub(crate) use access::gdal_setup::{open_address, prepare_gdal, with_gdal};
+pub(crate) use access::web_file::WebFile;

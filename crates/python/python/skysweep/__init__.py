@@ -35,7 +35,8 @@ Progress, reports, errors
     are a :class:`SkysweepError`: :class:`InputError`, :class:`FileError`,
     :class:`FileMissingError`, :class:`OutputExistsError`, :class:`InUseError`, :class:`CrsError`,
     :class:`CancelledError`. Warnings of jobs go to the logger ``skysweep``; a vertical datum that is
-    assumed is a :class:`DatumWarning`. :func:`allow_remote` lets jobs read addresses.
+    assumed is a :class:`DatumWarning`. :func:`allow_remote` lets jobs read addresses, and
+    :func:`fetch_grids` lets them fetch geoid grids.
 """
 
 from . import _jobs
@@ -57,6 +58,7 @@ from ._evaluate import evaluate as evaluate
 from ._jobs import *  # noqa: F403
 from ._native import __version__ as __version__
 from ._native import allow_remote as allow_remote
+from ._native import fetch_grids as fetch_grids
 from ._plan import Plan as Plan
 from ._raster import Bounds as Bounds
 from ._raster import Raster as Raster
@@ -92,6 +94,7 @@ __all__ = [
     "__version__",
     "allow_remote",
     "evaluate",
+    "fetch_grids",
     "read_raster",
     "write_raster",
 ]

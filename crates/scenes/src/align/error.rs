@@ -1,10 +1,13 @@
 //! Why an alignment ends without a result.
 
+use std::path::PathBuf;
+
 use colmap::align::AlignError;
 use crs::CrsError;
 use geodesy::GeodesyError;
 use io::colmap::ColmapError;
 use io::control::ControlError;
+use io::raster::RasterError;
 use numeric::Cancelled;
 
 use job::error::{JobError, from_steps};
@@ -46,6 +49,40 @@ pub enum AlignJobError {
     NotMetres {
         /// EPSG code of the CRS.
         epsg: u32,
+    },
+    /// A map to align over is not projected in metres.
+    #[error("the map is not projected in metres, which an alignment is made in: warp it first: {map}")]
+    MapNotInMetres {
+        /// Name of the map.
+        map: String,
+    },
+    /// A map to align over has no place in the world.
+    #[error("the map has no coordinate system, so nothing can be brought to the world with it")]
+    MapNotPlaced,
+    /// A model has no points to lay over a map.
+    #[error("the model has no points3D, which are laid over the map: {}", path.display())]
+    NoPoints {
+        /// Folder of the model.
+        path: PathBuf,
+    },
+    /// More pairs than a person picks.
+    #[error("found {found} pairs, at most {most} can be saved")]
+    TooManyPairs {
+        /// Number of pairs.
+        found: usize,
+        /// Most pairs.
+        most: usize,
+    },
+    /// A photograph cannot be read.
+    #[error(transparent)]
+    Picture(#[from] RasterError),
+    /// A photograph cannot be made a picture of a page.
+    #[error("the photograph cannot be shown ({reason}): {}", path.display())]
+    Photograph {
+        /// The file.
+        path: PathBuf,
+        /// Why not.
+        reason: String,
     },
     /// An image has two positions.
     #[error("image {image:?} has two positions: keep one")]

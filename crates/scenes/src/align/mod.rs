@@ -1,23 +1,26 @@
 //! The alignment job: moves a COLMAP model to the world by GPS positions of its images or by points
-//! known in both.
+//! known in both. [`ManualAlign`] does so by hand, over a map.
 //!
 //! The moved model is in metres along the axes of a map, relative to the origin in `origin.json`.
 
+mod by_hand;
 mod config;
 mod error;
 mod output;
+mod photograph;
 mod text;
 mod world;
 
 use std::path::Path;
 
 use colmap::align::{
-    AlignConfig, AlignError, CameraUp, Disturbance, ModelAlignment, NoiseLevel, align, align_upright, camera_up,
-    disturbed, sensitivity, spread_ratio, tilt_sigma_deg,
+    AlignConfig, AlignError, CameraUp, Disturbance, ModelAlignment, NoiseLevel, PointPair, align, align_upright,
+    camera_up, disturbed, sensitivity, spread_ratio, tilt_sigma_deg,
 };
 use io::splat_ply::LocalOrigin;
 use serde::Serialize;
 
+pub use by_hand::{AlignMap, ManualAlign, ManualAlignConfig, ManualAlignReport, ManualFit, ManualStart};
 pub use config::AlignJobConfig;
 pub use error::AlignJobError;
 pub use output::SimilarityParts;
@@ -121,7 +124,7 @@ pub fn run(config: &AlignJobConfig, progress: &dyn Progress) -> Result<AlignJobR
     let world = World::of(&positions, config.crs_epsg, config.vertical)?;
     let known = world.known(&positions, &model.cameras)?;
     let search = AlignConfig { threshold_m: config.threshold_m, seed: config.seed, ..AlignConfig::default() };
-    let Aligned { alignment, tilt_sigma_deg, upright } = aligned(config, &known, &model, &search)
+    let Aligned { alignment, tilt_sigma_deg, upright } = aligned(config.use_gravity, &known.pairs, &model, &search)
         .map_err(|source| AlignJobError::Alignment { pairs: known.pairs.len(), source })?;
     let noise = config.noise.as_ref();
     let levels = noise.map(|noise| sensitivity(&known.pairs, &alignment, noise, &search)).unwrap_or_default();
@@ -152,17 +155,17 @@ struct Aligned {
 /// Aligns a model by its positions, and by the up directions of its cameras where the positions do
 /// not determine the tilt.
 fn aligned(
-    config: &AlignJobConfig,
-    known: &KnownPositions,
+    use_gravity: bool,
+    pairs: &[PointPair],
     model: &ModelWithPoints,
     search: &AlignConfig,
 ) -> Result<Aligned, AlignError> {
-    let plain = align(&known.pairs, search);
-    let tilt_sigma_deg = plain.as_ref().map_or(f64::INFINITY, |found| tilt_sigma_deg(&known.pairs, found));
-    let up = if config.use_gravity && tilt_sigma_deg > TILT_LOOSE_DEG { held_up(model) } else { None };
+    let plain = align(pairs, search);
+    let tilt_sigma_deg = plain.as_ref().map_or(f64::INFINITY, |found| tilt_sigma_deg(pairs, found));
+    let up = if use_gravity && tilt_sigma_deg > TILT_LOOSE_DEG { held_up(model) } else { None };
     match (plain, up) {
         (Ok(_) | Err(AlignError::Degenerate { .. }), Some(up)) => {
-            let alignment = align_upright(&known.pairs, &up, search)?;
+            let alignment = align_upright(pairs, &up, search)?;
             Ok(Aligned { alignment, tilt_sigma_deg, upright: true })
         }
         (plain, _) => Ok(Aligned { alignment: plain?, tilt_sigma_deg, upright: false }),

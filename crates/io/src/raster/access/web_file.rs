@@ -47,13 +47,13 @@ static AGENT: LazyLock<Agent> = LazyLock::new(|| {
 });
 
 /// A file at an address, and a position in it.
-pub(in crate::raster) struct WebFile {
+pub(crate) struct WebFile {
     /// The address after redirects.
     address: String,
     size: u64,
     position: u64,
     /// Whether a read met the end of the file.
-    pub(in crate::raster) is_at_end: bool,
+    pub(crate) is_at_end: bool,
 }
 
 /// Bytes of a file, and the size of the whole.
@@ -67,21 +67,21 @@ impl WebFile {
     ///
     /// # Errors
     /// What the server answered instead of a part of the file, or that it did not answer in time.
-    pub(in crate::raster) fn open(address: &str) -> Result<Self, String> {
+    pub(crate) fn open(address: &str) -> Result<Self, String> {
         let mut address = address.to_owned();
         let first = part(&mut address, 0, 1)?;
         Ok(Self { address, size: first.size, position: 0, is_at_end: false })
     }
 
-    pub(in crate::raster) fn position(&self) -> u64 {
+    pub(crate) fn position(&self) -> u64 {
         self.position
     }
 
-    pub(in crate::raster) fn size(&self) -> u64 {
+    pub(crate) fn size(&self) -> u64 {
         self.size
     }
 
-    pub(in crate::raster) fn seek(&mut self, position: u64) {
+    pub(crate) fn seek(&mut self, position: u64) {
         self.position = position;
         self.is_at_end = false;
     }
@@ -91,7 +91,7 @@ impl WebFile {
     ///
     /// # Errors
     /// As [`WebFile::open`].
-    pub(in crate::raster) fn read(&mut self, buffer: &mut [u8]) -> Result<usize, String> {
+    pub(crate) fn read(&mut self, buffer: &mut [u8]) -> Result<usize, String> {
         let left = usize::try_from(self.size.saturating_sub(self.position)).unwrap_or(usize::MAX);
         let wanted = buffer.len().min(left);
         self.is_at_end = wanted < buffer.len();
