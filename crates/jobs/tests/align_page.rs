@@ -31,7 +31,7 @@ fn town_cameras() -> ColmapModel {
 /// Writes a model, and returns the similarity from it to the world.
 fn planted(folder: &Path) -> Similarity {
     let cameras = town_cameras();
-    let dem = io::raster::read_dem(&map()).unwrap();
+    let dem = io::raster::read_dem(map()).unwrap();
     let (x, y) = dem.geotransform.map_from_cell(320.0, 320.0);
     let turn = [[0.36, 0.48, 0.8], [-0.8, 0.6, 0.0], [-0.48, -0.64, 0.6]];
     let world = Similarity::new(4.0, turn, [x, y, 200.0]).unwrap();
@@ -234,7 +234,7 @@ fn requests_that_mean_nothing_are_refused_in_words() {
 #[test]
 fn many_points_are_thinned_and_an_aligned_model_stays() {
     let folder = tempfile::tempdir().unwrap();
-    let dem = io::raster::read_dem(&map()).unwrap();
+    let dem = io::raster::read_dem(map()).unwrap();
     let (x, y) = dem.geotransform.map_from_cell(50.0, 50.0);
     let point = |i: u32| {
         let position = [x + f64::from(i % 7), y + f64::from(i % 5), 190.0];
