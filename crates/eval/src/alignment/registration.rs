@@ -248,7 +248,7 @@ fn grown(bounds: &[Range<usize>; 2]) -> [Range<usize>; 2] {
 
 /// Cuts the cells that lie `moved` columns and rows from a part out of a grid, and puts a rim
 /// without values around them.
-fn cut(grid: &Grid<f32>, [columns, rows]: &[Range<usize>; 2], moved: [isize; 2], rim: usize) -> Grid<f32> {
+pub(crate) fn cut(grid: &Grid<f32>, [columns, rows]: &[Range<usize>; 2], moved: [isize; 2], rim: usize) -> Grid<f32> {
     let mut out = Grid::filled(columns.len() + 2 * rim, rows.len() + 2 * rim, f32::NAN);
     for (row, from) in rows.clone().enumerate() {
         let at =
@@ -261,7 +261,7 @@ fn cut(grid: &Grid<f32>, [columns, rows]: &[Range<usize>; 2], moved: [isize; 2],
 }
 
 /// Returns test − reference, the test moved by some cells; NaN where either is void.
-fn differences(test: &Grid<f32>, reference: &Grid<f32>, [columns, rows]: [f64; 2]) -> Grid<f32> {
+pub(crate) fn differences(test: &Grid<f32>, reference: &Grid<f32>, [columns, rows]: [f64; 2]) -> Grid<f32> {
     let mut out = Grid::filled(reference.width(), reference.height(), f32::NAN);
     let width = reference.width().max(1);
     out.data_mut().par_chunks_mut(width).enumerate().for_each(|(row, out)| {
