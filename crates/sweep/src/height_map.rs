@@ -37,6 +37,13 @@ impl HeightMap {
         }
     }
 
+    /// Drops all but the heights: what other views are compared with once the view is placed.
+    pub fn keep_heights(&mut self) {
+        for measure in [&mut self.sigma_m, &mut self.confidence, &mut self.support] {
+            *measure = Grid::filled(0, 0, f32::NAN);
+        }
+    }
+
     /// Removes the height of a pixel.
     pub(crate) fn clear(&mut self, at: (usize, usize)) {
         self.height_m[at] = f32::NAN;

@@ -19,7 +19,7 @@ use crate::reference::Reference;
 use crate::simd::Avx2;
 use crate::simd::{Arrays, Kernel};
 use crate::support::agreed_share;
-use crate::tiles::tiles;
+use crate::tiles::tiles_on;
 use crate::view::ViewLevel;
 use crate::volume::CostVolume;
 
@@ -67,7 +67,9 @@ pub fn sweep_level(
     config: &LevelConfig,
 ) -> Result<HeightMap, SweepError> {
     let (width, height) = (reference.view.image.width(), reference.view.image.height());
-    let cores = tiles(Window::whole(width, height), block_side(reference.ranges));
+    // Blocks begin where the part of an image does, but end on the tiles of the whole.
+    let first = reference.view.first.map(|at| at % BLOCK_MARGIN);
+    let cores = tiles_on(Window::whole(width, height), block_side(reference.ranges), first);
     let mut parts: Vec<HeightMap> = cores
         .par_iter()
         .map(|core| sweep_block(reference, sources, *core, origin_m, config))
@@ -335,19 +337,38 @@ mod tests {
         assert!(same(&swept(&views, &[1, 2]), &swept(&changed, &[1, 2])) > 0.99);
     }
 
-    /// Whole tiles are cut off at the upper left of all views: the rest keeps its heights.
+    /// Whole tiles are cut off at the upper left of all views, or parts of tiles: the rest keeps
+    /// its heights.
     #[test]
     fn where_the_images_begin_does_not_matter() {
         let views = three_views(192);
-        let cut = Window { x: 64, y: 64, width: 128, height: 128 };
-        let origin = camera::ImagePoint::new(64.0, 64.0);
-        let parts: Vec<SweepView> =
-            views.iter().map(|v| SweepView::new(v.camera.cropped(origin), v.levels[0].window(cut, f32::NAN))).collect();
-        let inner = Window { x: 20, y: 20, width: 88, height: 88 };
-        let whole = swept(&views, &[1, 2]).height_m.window(cut, f32::NAN).window(inner, f32::NAN);
-        let part = swept(&parts, &[1, 2]).height_m.window(inner, f32::NAN);
-        let same = whole.data().iter().zip(part.data()).filter(|(a, b)| (*a - *b).abs() < 0.02).count();
-        assert!(same * 100 >= 99 * part.data().len(), "{same} of {}", part.data().len());
+        let whole = swept(&views, &[1, 2]).height_m;
+        for (x, y) in [(64, 64), (40, 24)] {
+            let cut = Window { x: x as i64, y: y as i64, width: 192 - x, height: 192 - y };
+            let origin = camera::ImagePoint::new(x as f64, y as f64);
+            let part = |v: &SweepView| SweepView::new(v.camera.cropped(origin), v.levels[0].window(cut, f32::NAN));
+            let parts: Vec<SweepView> = views.iter().map(|v| part(v).beginning_at([x, y])).collect();
+            let inner = Window { x: 20, y: 20, width: cut.width - 40, height: cut.height - 40 };
+            let whole = whole.window(cut, f32::NAN).window(inner, f32::NAN);
+            let part = swept(&parts, &[1, 2]).height_m.window(inner, f32::NAN);
+            let same = whole.data().iter().zip(part.data()).filter(|(a, b)| (*a - *b).abs() < 0.02).count();
+            assert!(same * 100 >= 99 * part.data().len(), "{same} of {} from {x}, {y}", part.data().len());
+        }
+    }
+
+    /// An image of another place among the sources does not change a bit.
+    #[test]
+    fn a_source_that_shows_nothing_of_a_tile_costs_nothing() {
+        let views = three_views(130);
+        let blind = SweepView::new(views[2].camera.clone(), Grid::filled(130, 130, f32::NAN));
+        let four = [&views[..], &[blind]].concat();
+        let bits = |map: &HeightMap| map.height_m.data().iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+        let best = |order: &[usize]| {
+            let ranges = Ranges::uniform(130, 130, 1.0, (-10.0, 30.0));
+            let sources: Vec<ViewLevel<'_>> = order.iter().map(|&i| four[i].on_level(i, 0)).collect();
+            sweep_level(reference(&four, &ranges), &sources, 0.0, &config(Aggregation::BestOf(1))).unwrap()
+        };
+        assert_eq!(bits(&best(&[1, 2])), bits(&best(&[1, 2, 3])));
     }
 
     #[test]

@@ -55,6 +55,10 @@ pub struct SweepView {
     /// Median difference between neighbouring pixels of each level, grey values: the unit of its
     /// texture.
     pub contrast: Vec<f32>,
+    /// Column and row of the first pixel in the image that this is a part of, level 0: the tiles in
+    /// which costs are computed are those of the whole image. Multiples of the pixels of the levels
+    /// used; zeros for a whole image.
+    pub first: [usize; 2],
 }
 
 impl SweepView {
@@ -73,7 +77,14 @@ impl SweepView {
         let mut levels = vec![Grid::filled(0, 0, f32::NAN); level];
         levels.extend(Pyramid::new(image, LEVELS_MAX, SIDE_MIN).into_levels());
         let contrast = levels.iter().map(typical_difference).collect();
-        Self { camera, levels, noise, contrast }
+        Self { camera, levels, noise, contrast, first: [0; 2] }
+    }
+
+    /// Makes the view a part of an image that begins at the column and row `first` of it, see
+    /// [`Self::first`].
+    #[must_use]
+    pub fn beginning_at(self, first: [usize; 2]) -> Self {
+        Self { first, ..self }
     }
 
     /// Sets the pixels of a level that lie outside a window of level 0 to NaN, so that no height is
@@ -94,10 +105,17 @@ impl SweepView {
         }
     }
 
+    /// Empties all levels but one, whose image is still needed; a level that the view does not have
+    /// empties all. The camera stays.
+    pub fn keep_level(&mut self, level: usize) {
+        let others = self.levels.iter_mut().enumerate().filter(|(other, _)| *other != level);
+        others.for_each(|(_, image)| *image = Grid::filled(0, 0, f32::NAN));
+    }
+
     /// Returns a view that does not see the scene: every level is empty.
     pub fn absent(camera: RpcCamera) -> Self {
         let levels = vec![Grid::filled(0, 0, f32::NAN); LEVELS_MAX];
-        Self { camera, levels, noise: 0.0, contrast: vec![0.0; LEVELS_MAX] }
+        Self { camera, levels, noise: 0.0, contrast: vec![0.0; LEVELS_MAX], first: [0; 2] }
     }
 
     /// Returns the view on one level; `index` is its index among the views.
@@ -108,6 +126,7 @@ impl SweepView {
             camera: &self.camera,
             noise: self.noise_at(level),
             contrast: self.contrast[level],
+            first: self.first.map(|at| at >> level),
         }
     }
 
@@ -145,6 +164,8 @@ pub struct ViewLevel<'a> {
     pub noise: f32,
     /// Median difference between neighbouring pixels on this level, grey values.
     pub contrast: f32,
+    /// Column and row of the first pixel in the image that this is a part of, pixels of this level.
+    pub first: [usize; 2],
 }
 
 /// Makes the few pixels invalid that are far beyond all others.
@@ -216,6 +237,17 @@ mod tests {
                 .blank(0);
         let expected = |i: usize| (3..5).contains(&(i % 9)) && (1..4).contains(&(i / 9));
         assert!((0..72).all(|i| blank.data()[i] == expected(i)), "{blank:?}");
+    }
+
+    #[test]
+    fn a_view_keeps_one_level_or_none() {
+        let camera = crate::testing::camera::leaning_camera(64, [0.0; 2]);
+        let mut view = SweepView::new(camera, Grid::filled(128, 128, 7.0));
+        let sides = |view: &SweepView| view.levels.iter().map(Grid::width).collect::<Vec<_>>();
+        view.keep_level(1);
+        assert_eq!(sides(&view), [0, 64, 0]);
+        view.keep_level(view.levels.len());
+        assert_eq!(sides(&view), [0; 3]);
     }
 
     #[test]

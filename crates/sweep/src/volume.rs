@@ -10,7 +10,7 @@ use crate::cost::{BlockCosts, CostConfig, TileScratch, sweep_tile};
 use crate::error::SweepError;
 use crate::ranges::{NOT_STEEP, Ranges};
 use crate::reference::Reference;
-use crate::tiles::tiles;
+use crate::tiles::tiles_on;
 use crate::view::ViewLevel;
 
 /// Largest number of hypotheses of a window: more would take over 2 GB.
@@ -57,7 +57,8 @@ impl CostVolume {
         costs.resize(offsets.last().map_or(0, |&n| n as usize) + LANES, 0);
         let mut scratch = TileScratch::default();
         let mut block = BlockCosts { window, offsets: &offsets, costs: &mut costs };
-        for tile in tiles(window, config.tile) {
+        let first = [(0, window.x), (1, window.y)].map(|(axis, at)| reference.view.first[axis] + at as usize);
+        for tile in tiles_on(window, config.tile, first) {
             sweep_tile(reference, sources, tile, config, &mut scratch, &mut block)?;
         }
         let mut edges = edge_strength(reference.view.image, window, reference.view.noise);

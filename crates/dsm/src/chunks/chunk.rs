@@ -9,7 +9,7 @@ use crate::error::DsmError;
 use crate::images::image_pixels::read_view;
 use crate::images::image_windows::GroundBox;
 use crate::planning::chunk_plan::{ChunkSweep, ChunkWork, read_chunk_views};
-use crate::planning::chunk_side::MARGIN_PX;
+use crate::planning::chunk_side::FINEST_MARGIN_PX;
 use crate::planning::plan::Plan;
 use crate::prior::prior_findings::PriorFindings;
 use crate::session::{Muted, Session};
@@ -86,15 +86,17 @@ pub fn run_chunk(plan: &Plan, index: usize, session: &mut Session<'_>) -> Result
     Ok(ChunkResult { core: chunk.core, content })
 }
 
-/// Sets the pixels of the finest level to NaN that were read only because windows begin on the
-/// tiles of the sweep, and with them half of the time of a small chunk.
+/// Sets the pixels of the finest level to NaN that only the coarser levels need, whose patches and
+/// paths reach farther: no height is searched for there.
 fn void_surplus(plan: &Plan, work: &ChunkSweep, views: &mut [SweepView]) -> Result<(), DsmError> {
+    let finest = work.levels.finest;
+    let margin = FINEST_MARGIN_PX << finest;
     let ground = GroundBox::new(&plan.grid.part(work.extent), &plan.grid.projection()?, work.height_range)?;
     for ((image, window), view) in plan.images.iter().zip(&work.windows).zip(views) {
         let Some(window) = window.filter(|window| *window != image.whole()) else { continue };
-        let needed = ground.span_in(image, MARGIN_PX)?;
+        let needed = ground.span_in(image, margin)?;
         let inside = Window { x: needed.x - window.x, y: needed.y - window.y, ..needed };
-        view.void_outside(work.levels.finest, inside);
+        view.void_outside(finest, inside);
     }
     Ok(())
 }

@@ -6,7 +6,11 @@
 //! if their numbers meant something else, are more likely wrong than the cameras.
 //!
 //! One wrong point among others is found by leaving it out: the cameras are adjusted to the others,
-//! and the point is compared with where they then see it, in units of the others' own spread.
+//! and the point is compared with where they then see it, in units of the others' own spread. At a
+//! corner of a block the others leave the cameras free, and a right point is far from there, too.
+//! How free they are is told by the adjustment with the point: it follows a point by the part
+//! v / (σ² + v) of the difference, of the point's own variance σ² and the cameras' variance v
+//! without it.
 
 use std::path::Path;
 
@@ -37,8 +41,9 @@ const REFUSED: f64 = 10.0;
 /// A control point is wrong when it is this many times as far from where the cameras that were
 /// adjusted to the others see it as the others are. The spread of four is known to a quarter.
 const TIMES_OTHERS: f64 = 4.0;
-/// And when it is further off than this many of its own stated deviations.
-const OWN_DEVIATIONS: f64 = 2.0;
+/// And when it is further off than this many deviations, of its own and of the cameras without it:
+/// of four hundred right points one is.
+const OWN_DEVIATIONS: f64 = 3.0;
 /// Least spread of the others, parts of what their own accuracies let expect: nobody measures
 /// places that much better than stated.
 const SPREAD_MIN: f64 = 0.25;
@@ -248,7 +253,7 @@ pub(crate) fn wrong_point(
     let tried = order.into_iter().take(TRIED_MAX).filter_map(|(number, _)| {
         let others: Vec<&SurveyedPoint> = (0..points.len()).filter(|i| *i != number).map(|i| points[i]).collect();
         let found = fit(&others.iter().map(|point| point.point.clone()).collect::<Vec<_>>());
-        let (times, reason) = contradiction(points[number], &others, &with(&found))?;
+        let (times, reason) = contradiction(points[number], &others, cameras, &with(&found))?;
         Some((times, number, reason, found))
     });
     let worst = tried.max_by(|a, b| a.0.total_cmp(&b.0))?;
@@ -256,8 +261,14 @@ pub(crate) fn wrong_point(
 }
 
 /// Returns how many times as far a point is from where cameras see it as the others are, and says
-/// it; `None` for a point that fits.
-fn contradiction(point: &SurveyedPoint, others: &[&SurveyedPoint], cameras: &[RpcCamera]) -> Option<(f64, String)> {
+/// it; `None` for a point that fits. `following` are the cameras adjusted to all points, and
+/// `cameras` those adjusted to the others.
+fn contradiction(
+    point: &SurveyedPoint,
+    others: &[&SurveyedPoint],
+    following: &[RpcCamera],
+    cameras: &[RpcCamera],
+) -> Option<(f64, String)> {
     /// Names of the three parts of a difference.
     const PARTS: [&str; 3] = ["east", "north", "height"];
     let Some((off, own)) = point.off_m(cameras).zip(point.expected_m(cameras)) else {
@@ -273,11 +284,14 @@ fn contradiction(point: &SurveyedPoint, others: &[&SurveyedPoint], cameras: &[Rp
             (residual / usual, text)
         });
     };
+    let left = point.off_m(following)?;
     let part = |axis: usize| {
+        // Of a difference d, σ² / (σ² + v) is left by cameras that follow the point.
+        let deviation_m = own[axis] * (off[axis] / left[axis]).abs().max(1.0).sqrt();
         let of_others = others.iter().filter_map(|other| Some(other.off_m(cameras)?[axis]));
         let spread_m = root_mean_square(of_others)?.max(SPREAD_MIN * own[axis]);
         let (off_m, times) = (off[axis], off[axis].abs() / spread_m);
-        let is_wrong = times > TIMES_OTHERS && off_m.abs() > OWN_DEVIATIONS * own[axis];
+        let is_wrong = times > TIMES_OTHERS && off_m.abs() > OWN_DEVIATIONS * deviation_m;
         let text = || {
             format!(
                 "its {} is off by {off_m:+.2} m where the cameras fit the others to {spread_m:.2} m; check its \
@@ -320,4 +334,54 @@ fn parallax_px_per_m(cameras: &[RpcCamera], seen: &Track, ground: LonLatHeight) 
     let all =
         seen.iter().flat_map(|from| seen.iter().filter_map(move |(to, _)| (*to != from.0).then(|| pair(from, *to))?));
     all.filter(|px| *px > 0.0).max_by(f64::total_cmp)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The cameras of the town, whose heights are off by some metres.
+    fn cameras(up_m: f64) -> Vec<RpcCamera> {
+        let town = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../data-samples/town");
+        let camera = |i: usize| {
+            let mut rpc = io::rpc::read_for_image(&town.join(format!("view_{i}.tif"))).unwrap().rpc;
+            rpc.height_off += up_m;
+            RpcCamera::new(rpc)
+        };
+        (1..=3).map(camera).collect()
+    }
+
+    /// A point at a place of the first image that cameras see `up_m` below where it is.
+    fn surveyed(place: [f64; 2], up_m: f64) -> SurveyedPoint {
+        let cameras = cameras(0.0);
+        let ground = cameras[0].localize(ImagePoint::new(place[0], place[1]), 200.0).unwrap();
+        let shown = |camera: &RpcCamera| camera.project(ground).unwrap();
+        SurveyedPoint {
+            name: "p".to_owned(),
+            given_height_m: 200.0 + up_m,
+            datum: VerticalDatum::Ellipsoid,
+            exchanged: None,
+            point: ControlPoint {
+                ground: LonLatHeight { height_m: 200.0 + up_m, ..ground },
+                horizontal_m: 0.1,
+                vertical_m: 0.1,
+                pixel_px: 0.1,
+                seen: cameras.iter().map(shown).enumerate().collect(),
+            },
+        }
+    }
+
+    /// A point is off by 2.5 m without it, and the others are not off at all. It is wrong where the
+    /// cameras hardly follow it, and right where they follow it all the way because nothing else
+    /// holds them there.
+    #[test]
+    fn a_point_that_holds_a_corner_alone_is_no_contradiction() {
+        let others = [[100.0, 100.0], [500.0, 120.0], [300.0, 420.0]].map(|place| surveyed(place, 0.0));
+        let others: Vec<&SurveyedPoint> = others.iter().collect();
+        let point = surveyed([520.0, 500.0], 2.5);
+        let found = |followed_m: f64| contradiction(&point, &others, &cameras(followed_m), &cameras(0.0));
+        let (times, text) = found(0.1).unwrap();
+        assert!(times > TIMES_OTHERS && text.contains("height is off by +2.50 m"), "{times}: {text}");
+        assert_eq!(found(2.49), None);
+    }
 }

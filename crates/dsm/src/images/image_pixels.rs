@@ -16,7 +16,7 @@ const BLACK_SIDE: usize = 5;
 
 /// Reads a window of an image with its pyramid. The camera of the view is that of the window.
 pub(crate) fn read_view(image: &SceneImage, window: Window) -> Result<SweepView, DsmError> {
-    Ok(SweepView::new(image.camera_of(window), read_pixels(image, window)?))
+    Ok(SweepView::new(image.camera_of(window), read_pixels(image, window)?).beginning_at(first_of(window)))
 }
 
 /// Reads one pyramid level of a window, whose first pixel must be the corner of a pixel of that
@@ -26,7 +26,12 @@ pub(crate) fn read_coarse_view(image: &SceneImage, window: Window, level: usize)
     for _ in 0..level {
         pixels = raster::reduce(&pixels);
     }
-    Ok(SweepView::from_level(image.camera_of(window), level, pixels))
+    Ok(SweepView::from_level(image.camera_of(window), level, pixels).beginning_at(first_of(window)))
+}
+
+/// Returns the column and row of an image at which a window begins.
+fn first_of(window: Window) -> [usize; 2] {
+    [window.x, window.y].map(|at| usize::try_from(at).unwrap_or(0))
 }
 
 /// Reads whole images, in parallel. `done` is called after each image.

@@ -2,9 +2,9 @@
 //!
 //! Pointing, grid and height step are those of the whole scene, and so are each image's noise and
 //! contrast. Each chunk chooses its own sources among the images that show it. The windows of a
-//! chunk begin on whole pixels of all the levels used, and its hypotheses lie on the scene's
-//! lattice. Neighbouring chunks therefore have the same heights in their overlap, but for what the
-//! paths of the aggregation bring from further away.
+//! chunk begin on whole pixels of all the levels used, their tiles are those of the whole images,
+//! and its hypotheses lie on the scene's lattice. Neighbouring chunks therefore have the same
+//! heights in their overlap, but for what the paths of the aggregation bring from further away.
 //!
 //! The heights of a chunk are found by a coarse sweep of it over all heights that the scene may
 //! have (see `probe`), towers included: a chunk in a plain does not pay for the mountains beside
@@ -26,11 +26,11 @@ use crate::images::image_pixels::read_coarse_view;
 use crate::images::image_windows::GroundBox;
 use crate::images::scene_image::SceneImage;
 use crate::memory;
-use crate::planning::chunk_side::{ENDS_ALIGNED, MARGIN_PX, SIDE_MIN, aligned, needed_mb, quarters, with_rim};
+use crate::planning::chunk_side::{ALIGNED, MARGIN_PX, SIDE_MIN, aligned, needed_mb, quarters, with_rim};
 use crate::planning::grid::DsmGrid;
 use crate::planning::levels::{SweepLevels, choose_levels, smallest_sides};
 use crate::planning::probe;
-use crate::planning::sources::SourceCandidates;
+use crate::planning::sources::{Parts, SourceCandidates};
 use crate::planning::view_geometry::ViewGeometry;
 use crate::session::Muted;
 use crate::sweeping::scene_sweep::SceneSweep;
@@ -118,6 +118,21 @@ pub(crate) struct ChunkPlanner<'a> {
     pub(crate) progress: &'a dyn Progress,
 }
 
+/// For each image, the images that it is compared with over a chunk.
+struct ChunkSources {
+    /// In the sweep.
+    all: Vec<Vec<usize>>,
+    /// In the coarse sweep that finds the heights.
+    probing: Vec<Vec<usize>>,
+}
+
+/// Returns which images have sources or are some.
+fn used(sources: &[Vec<usize>]) -> Vec<bool> {
+    let mut used: Vec<bool> = sources.iter().map(|own| !own.is_empty()).collect();
+    sources.iter().flatten().for_each(|source| used[*source] = true);
+    used
+}
+
 /// Result of planning a chunk.
 enum Planned {
     Work(ChunkWork),
@@ -165,15 +180,14 @@ impl ChunkPlanner<'_> {
         let extent = with_rim(self.grid, core);
         let grid = self.grid.part(extent);
         let seen = self.seen(&grid)?;
-        let sources = self.sources(&grid, &seen)?;
-        let is_used = |i: usize| !sources[i].is_empty() || sources.iter().any(|s| s.contains(&i));
-        let seen: Vec<bool> = (0..seen.len()).map(is_used).collect();
+        let ChunkSources { all: sources, probing } = self.sources(&grid, &seen)?;
+        let seen = used(&sources);
         if sources.iter().all(Vec::is_empty) {
             return Ok(Planned::Work(ChunkWork::Unseen));
         }
         let limit_mb = memory::limit_mb(self.config);
         let is_small = core.width.max(core.height) <= SIDE_MIN;
-        let wide = self.windows(&grid, self.wide_range(), &seen)?;
+        let wide = self.windows(&grid, self.wide_range(), &used(&probing))?;
         let pixels: u64 = wide.iter().flatten().map(memory::area).fold(0, u64::saturating_add);
         let too_large = |needed_mb| {
             let error = DsmError::Memory { needed_mb, limit_mb };
@@ -183,7 +197,7 @@ impl ChunkPlanner<'_> {
         if coarse_mb > limit_mb {
             return too_large(coarse_mb);
         }
-        let height_range = self.heights(&wide, &sources)?;
+        let height_range = self.heights(&wide, probing)?;
         let windows = self.windows(&grid, height_range, &seen)?;
         let needed_mb = needed_mb(&windows.iter().copied().flatten().collect::<Vec<_>>(), &grid);
         if needed_mb > limit_mb {
@@ -206,13 +220,18 @@ impl ChunkPlanner<'_> {
     }
 
     /// Chooses the images that are used over the grid, and the sources of each.
-    fn sources(&self, grid: &DsmGrid, seen: &[bool]) -> Result<Vec<Vec<usize>>, DsmError> {
+    fn sources(&self, grid: &DsmGrid, seen: &[bool]) -> Result<ChunkSources, DsmError> {
         let ground = GroundBox::new(grid, self.projection, self.range)?.outline(&self.geometry.frame);
         let part = |(seen, outline): (&bool, &Polygon<f64>)| {
             if *seen { shared_part(outline, &ground) } else { None }
         };
-        let parts: Vec<Option<Polygon<f64>>> = seen.iter().zip(&self.geometry.outlines).map(part).collect();
-        Ok(self.candidates.choose(&self.candidates.best_views(&ground, parts)))
+        let parts: Parts = seen.iter().zip(&self.geometry.outlines).map(part).collect();
+        let parts = self.candidates.best_views(&ground, parts);
+        let all = self.candidates.choose(&parts);
+        let probing = self.candidates.choose(&self.candidates.probing_views(&ground, parts));
+        // The best views may be those that were matched with none of each other.
+        let probing = if probing.iter().all(Vec::is_empty) { all.clone() } else { probing };
+        Ok(ChunkSources { all, probing })
     }
 
     /// Returns all heights that something in the scene may have: those given, or those of the tie
@@ -242,7 +261,7 @@ impl ChunkPlanner<'_> {
     /// have: those of the scene if all that was found lies among them, and otherwise those found.
     /// Where the scene's are so many that they take [`LEVELS_SAVED`] pyramid levels more, those
     /// found are used as well, because small things are lost on coarse levels.
-    fn heights(&self, windows: &[Option<Window>], sources: &[Vec<usize>]) -> Result<HeightRange, DsmError> {
+    fn heights(&self, windows: &[Option<Window>], sources: Vec<Vec<usize>>) -> Result<HeightRange, DsmError> {
         let wide = self.wide_range();
         // What a sweep finds is at least a margin high after it was cut, so it saves no levels of
         // so few given heights, and the sweep, which takes nearly all time, changes nothing.
@@ -250,7 +269,7 @@ impl ChunkPlanner<'_> {
             return Ok(self.range);
         }
         let side = windows.iter().flatten().map(|w| w.width.min(w.height)).min().unwrap_or(0);
-        let sides: Vec<usize> = (0..ENDS_ALIGNED.ilog2()).map(|level| side >> level).collect();
+        let sides: Vec<usize> = (0..ALIGNED.ilog2()).map(|level| side >> level).collect();
         let level = probe::level_of(self.pixel_m, &sides);
         let views = read_chunk_views(self.images, self.characters, windows, |image, window| {
             read_coarse_view(image, window, level)
@@ -259,7 +278,7 @@ impl ChunkPlanner<'_> {
             range: wide,
             step_m: self.step_m,
             levels: SweepLevels::only(level),
-            sources: sources.to_vec(),
+            sources,
             reach: self.tuning.reaches(),
             jump_at_edge: self.tuning.jump_at_edge,
             priors: Vec::new(),

@@ -21,11 +21,13 @@ pub(crate) const SIDE_MIN: usize = 256;
 /// Pixels read around what shows a chunk with its rim. Patches and the aggregation reach out, on
 /// coarse levels by several pixels of the image for each of their own.
 pub(crate) const MARGIN_PX: usize = 96;
-/// Windows begin on multiples of this, pixels: on the tiles of the sweep, of 64 pixels, on four
-/// levels. Costs then do not depend on the window in which they are computed.
-const ALIGNED: i64 = 512;
-/// Windows end on multiples of this, pixels: whole pixels of seven levels.
-pub(crate) const ENDS_ALIGNED: i64 = 64;
+/// Pixels around what shows a chunk with its rim in which heights are searched on the finest level,
+/// pixels of it: patches reach two, and a path of the aggregation forgets its start within a few
+/// tens. The rim, which only tells speckle and what fills a void, lies between these pixels and
+/// what is kept.
+pub(crate) const FINEST_MARGIN_PX: usize = 32;
+/// Windows begin and end on multiples of this, pixels: whole pixels of seven levels.
+pub(crate) const ALIGNED: usize = 64;
 
 /// Returns the largest side of a chunk that the memory allows, cells, when its heights lie in
 /// `range`.
@@ -107,15 +109,14 @@ pub(crate) fn quarters(core: Window) -> Vec<Window> {
     cores((core.width, core.height), half).into_iter().map(moved).collect()
 }
 
-/// Returns a window widened to multiples of [`ALIGNED`] at its start and [`ENDS_ALIGNED`] at its
-/// end.
+/// Returns a window widened to multiples of [`ALIGNED`].
 pub(crate) fn aligned(w: Window) -> Window {
-    let (x, y) = (w.x.div_euclid(ALIGNED) * ALIGNED, w.y.div_euclid(ALIGNED) * ALIGNED);
-    let length = |from: i64, start: i64, length: usize| {
-        let all = (start - from) as usize + length;
-        all.next_multiple_of(ENDS_ALIGNED as usize)
+    let along = |from: i64, length: usize| {
+        let start = from.div_euclid(ALIGNED as i64) * ALIGNED as i64;
+        (start, ((from - start) as usize + length).next_multiple_of(ALIGNED))
     };
-    Window { x, y, width: length(x, w.x, w.width), height: length(y, w.y, w.height) }
+    let ((x, width), (y, height)) = (along(w.x, w.width), along(w.y, w.height));
+    Window { x, y, width, height }
 }
 
 #[cfg(test)]
@@ -139,8 +140,8 @@ mod tests {
     }
 
     #[test]
-    fn windows_begin_on_tiles_and_end_on_whole_pixels_of_all_levels() {
+    fn windows_begin_and_end_on_whole_pixels_of_all_levels() {
         let window = aligned(Window { x: -5, y: 70, width: 100, height: 58 });
-        assert_eq!(window, Window { x: -512, y: 0, width: 640, height: 128 });
+        assert_eq!(window, Window { x: -64, y: 64, width: 192, height: 64 });
     }
 }

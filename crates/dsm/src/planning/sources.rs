@@ -16,6 +16,9 @@ use crate::values::ImagePair;
 /// Views that are used over one place, where there are more. Errors of heights fall with the root
 /// of the number of views, while time and memory grow with it.
 const VIEWS: usize = 16;
+/// Views by which the heights of a chunk are found, over one place: two that confirm a height, and
+/// one more for each that may be hidden or clouded there. Towers stand in any of them.
+const PROBING_VIEWS: usize = 4;
 /// Least rating of an angle, so that tie points decide among pairs with bad angles.
 const MERIT_MIN: f64 = 0.05;
 
@@ -50,6 +53,9 @@ pub(crate) fn choose_sources(
     }
     Ok(sources)
 }
+
+/// The part of the ground that each view shows; `None` for a view that is not used.
+pub(crate) type Parts = Vec<Option<Polygon<f64>>>;
 
 /// For each view, the views that it can be compared with, the best ones first.
 pub(crate) struct SourceCandidates<'a> {
@@ -86,17 +92,22 @@ impl<'a> SourceCandidates<'a> {
 
     /// Keeps the best [`VIEWS`] views over each place of the ground, and at most twice as many in
     /// all. `parts` are the parts of the ground that the views show.
-    pub(crate) fn best_views(
-        &self,
-        ground: &Polygon<f64>,
-        mut parts: Vec<Option<Polygon<f64>>>,
-    ) -> Vec<Option<Polygon<f64>>> {
+    pub(crate) fn best_views(&self, ground: &Polygon<f64>, parts: Parts) -> Parts {
+        self.best(VIEWS, ground, parts)
+    }
+
+    /// Keeps the best [`PROBING_VIEWS`] in the same way: enough to tell which heights there are.
+    pub(crate) fn probing_views(&self, ground: &Polygon<f64>, parts: Parts) -> Parts {
+        self.best(PROBING_VIEWS, ground, parts)
+    }
+
+    fn best(&self, count: usize, ground: &Polygon<f64>, mut parts: Parts) -> Parts {
         let mut order: Vec<usize> = (0..parts.len()).filter(|i| parts[*i].is_some()).collect();
-        if order.len() <= VIEWS {
+        if order.len() <= count {
             return parts;
         }
         order.sort_by(|&a, &b| self.worth[b].total_cmp(&self.worth[a]).then(a.cmp(&b)));
-        let best = Places::over(ground).choose(order.into_iter().map(|i| (i, &self.outlines[i])), VIEWS);
+        let best = Places::over(ground).choose(order.into_iter().map(|i| (i, &self.outlines[i])), count);
         parts.iter_mut().enumerate().filter(|(i, _)| !best.contains(i)).for_each(|(_, part)| *part = None);
         parts
     }

@@ -141,7 +141,9 @@ fn check_pictures(images: &[SceneImage], looked: &FirstLook, views: Option<&[Swe
     if let (Some(first), true) = (blank, pictures < 2) {
         return Err(DsmError::Blank { path: path(first) });
     }
-    match at_one_shift(&looked.ties).map_or_else(|| same_picture(images, views), |pair| Ok(Some(pair)))? {
+    match at_one_shift(&looked.ties)
+        .map_or_else(|| same_picture(images, &looked.geometry, views), |pair| Ok(Some(pair)))?
+    {
         Some(pair) => Err(DsmError::SamePixels { first: path(pair.first), second: path(pair.second) }),
         None => Ok(()),
     }

@@ -7,6 +7,9 @@
 //! and in the middle lie at different shifts. Copies have one shift everywhere.
 //!
 //! Where the detail is too fine for the coarse search, tie points tell the same.
+//!
+//! Only images that share most of their ground by their RPCs are compared. A copy that lies
+//! elsewhere has no ties with the others and is set aside, and in a block most pairs share little.
 
 use numeric::upper_median;
 use raster::{Grid, Window, reduce};
@@ -16,6 +19,7 @@ use sweep::SweepView;
 use crate::error::DsmError;
 use crate::images::image_pixels::read_view;
 use crate::images::scene_image::SceneImage;
+use crate::planning::view_geometry::ViewGeometry;
 use crate::pointing::ties::{PairTies, TIES_MIN};
 use crate::values::ImagePair;
 
@@ -38,6 +42,15 @@ const PLACES_MIN: usize = 3;
 /// Least correlation of copies. A JPEG copy of a noisy image has 0.96, and one with noise of a
 /// tenth of its contrast 0.99. Different exposures reach it too, on smooth ground and at one place.
 const ALIKE: f32 = 0.9;
+/// Least correlation of copies at half the resolution, where the true place lies up to half a pixel
+/// beside the one found. Squares of a checkered pattern of three pixels, as fine as images resolve,
+/// still have 0.6 then. Of less no other resolution is looked at.
+const ALIKE_AT_HALF: f32 = 0.5;
+/// Sums that are kept side by side, so that they fill the registers of vectors.
+const LANES: usize = 8;
+/// Least ground that two images share by their RPCs to be compared, as a share of the smaller
+/// one's.
+const SHARED_MIN: f64 = 0.5;
 /// Shifts of one copy differ by no more than this, pixels. Those of the tests' good pairs, real and
 /// simulated, differ by 7 to 60 pixels.
 const SHIFT_SPREAD: i64 = 1;
@@ -75,16 +88,23 @@ struct Suspect {
     shifts: Vec<[i64; 2]>,
 }
 
-/// Finds two images that are one picture; `views` are the images where they were read as a whole.
+/// Finds two images that are one picture among those that share most of their ground; `views` are
+/// the images where they were read as a whole.
 ///
 /// # Errors
 /// [`DsmError::Image`] for an image that cannot be read.
-pub(crate) fn same_picture(images: &[SceneImage], views: Option<&[SweepView]>) -> Result<Option<ImagePair>, DsmError> {
+pub(crate) fn same_picture(
+    images: &[SceneImage],
+    geometry: &ViewGeometry,
+    views: Option<&[SweepView]>,
+) -> Result<Option<ImagePair>, DsmError> {
     let smallest = |of: fn(&SceneImage) -> usize| images.iter().map(of).min().unwrap_or(0);
     let (width, height) = (smallest(|image| image.size.0), smallest(|image| image.size.1));
     let side = SIDE.min(width.min(height) / 2);
     let pairs = (0..images.len()).flat_map(|i| (i + 1..images.len()).map(move |j| ImagePair::new(i, j)));
-    let mut suspects: Vec<Suspect> = pairs.map(|pair| Suspect { pair, shifts: Vec::new() }).collect();
+    let shares_ground = |pair: &ImagePair| geometry.pair(*pair).is_some_and(|p| p.overlap >= SHARED_MIN);
+    let mut suspects: Vec<Suspect> =
+        pairs.filter(shares_ground).map(|pair| Suspect { pair, shifts: Vec::new() }).collect();
     for (x, y) in PLACES {
         let start = |share: f64, size: usize| ((share * size as f64) as i64 - side as i64 / 2).max(0);
         let square = Window { x: start(x, width), y: start(y, height), width: side, height: side };
@@ -181,14 +201,19 @@ fn likeness(first: &Place, second: &Place, square: Window) -> Likeness {
     if places.is_empty() {
         return Likeness::Blank;
     }
-    let refined = |place: [i64; 2]| {
-        (0..COARSE).rev().try_fold((place, 0.0), |(place, _), level| {
-            // A pixel of the coarser level is two here, and the square began on an odd one.
-            let near = [2 * place[0], 2 * place[1]];
-            template(level)?.places_near(&second.levels[level], near, 3, 1).pop()
-        })
+    let finer = |template: &Template, level: usize, place: [i64; 2]| {
+        // A pixel of the coarser level is two here, and the square began on an odd one.
+        let near = [2 * place[0], 2 * place[1]];
+        template.places_near(&second.levels[level], near, 3, 1).pop()
     };
-    let best = places.into_iter().filter_map(|(place, _)| refined(place)).max_by(|a, b| a.1.total_cmp(&b.1));
+    let mut found = places;
+    for level in (1..COARSE).rev() {
+        let Some(template) = template(level) else { return Likeness::Nowhere };
+        found = found.into_iter().filter_map(|(place, _)| finer(&template, level, place)).collect();
+    }
+    let is_alike = |(_, correlation): &([i64; 2], f32)| *correlation >= ALIKE_AT_HALF;
+    let refined = found.into_iter().filter(is_alike).filter_map(|(place, _)| finer(&fine, 0, place));
+    let best = refined.max_by(|a, b| a.1.total_cmp(&b.1));
     let Some((place, correlation)) = best else { return Likeness::Nowhere };
     if correlation < ALIKE {
         return Likeness::Nowhere;
@@ -240,17 +265,21 @@ impl Template {
         if x + self.width > image.width() || y + self.height > image.height() {
             return None;
         }
-        let (mut sum, mut squares, mut product) = (0.0f32, 0.0f32, 0.0f32);
+        let (mut sums, mut squares, mut products) = ([0.0f32; LANES], [0.0f32; LANES], [0.0f32; LANES]);
         // Sums about a value of the square itself keep the digits of images with a large offset.
         let offset = image[(x, y)];
         for (row, own) in self.pixels.chunks_exact(self.width).enumerate() {
-            for (value, own) in image.row(y + row)[x..x + self.width].iter().zip(own) {
-                let value = value - offset;
-                sum += value;
-                squares += value * value;
-                product += value * own;
+            let values = &image.row(y + row)[x..x + self.width];
+            for (values, own) in values.chunks(LANES).zip(own.chunks(LANES)) {
+                for (lane, (value, own)) in values.iter().zip(own).enumerate() {
+                    let value = value - offset;
+                    sums[lane] += value;
+                    squares[lane] += value * value;
+                    products[lane] += value * own;
+                }
             }
         }
+        let [sum, squares, product] = [sums, squares, products].map(|lanes| lanes.iter().sum::<f32>());
         let count = self.pixels.len() as f32;
         let deviation = (squares / count - (sum / count).powi(2)).sqrt();
         let correlation = product / (count * deviation * self.deviation);
@@ -271,12 +300,13 @@ mod tests {
     use crate::images::open::open;
 
     /// The images and views of two views of the town.
-    fn town() -> (Vec<SceneImage>, Vec<SweepView>) {
+    fn town() -> (Vec<SceneImage>, ViewGeometry, Vec<SweepView>) {
         let town = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../data-samples/town");
         let paths = ["view_1.tif", "view_3.tif"].map(|name| town.join(name));
         let images = open(&DsmConfig::new(paths.into(), "unused".into())).unwrap().images;
         let views = read_views(&images, &|| ()).unwrap();
-        (images, views)
+        let geometry = ViewGeometry::at(&images, images[0].camera.rpc.height_off).unwrap();
+        (images, geometry, views)
     }
 
     #[test]
@@ -295,15 +325,22 @@ mod tests {
 
     #[test]
     fn copies_are_one_picture_and_two_exposures_are_not() {
-        let (images, views) = town();
-        assert_eq!(same_picture(&images, Some(&views)).unwrap(), None);
-        assert_eq!(same_picture(&images, None).unwrap(), None);
+        let (images, geometry, views) = town();
+        assert_eq!(same_picture(&images, &geometry, Some(&views)).unwrap(), None);
+        assert_eq!(same_picture(&images, &geometry, None).unwrap(), None);
         let original = &views[0].levels[0];
         let noise = |i: usize| (i.wrapping_mul(2_654_435_761) >> 7) % 41;
         let brighter = |change: &dyn Fn(usize, f32) -> f32| {
             let data = original.data().iter().enumerate().map(|(i, value)| change(i, *value)).collect();
             Grid::from_vec(original.width(), original.height(), data).unwrap()
         };
+        // A copy under the RPC of another place shares no ground, and is not looked at.
+        let mut elsewhere = images[0].clone();
+        elsewhere.camera.rpc.long_off += 0.05;
+        let apart = [images[0].clone(), elsewhere, images[1].clone()];
+        let far = ViewGeometry::at(&apart, images[0].camera.rpc.height_off).unwrap();
+        let pixels = [views[0].clone(), views[0].clone(), views[1].clone()];
+        assert_eq!(same_picture(&apart, &far, Some(&pixels)).unwrap(), None);
         let cut = Window { x: 37, y: 21, width: original.width() - 37, height: original.height() - 21 };
         let copies = [
             brighter(&|_, value| value),
@@ -315,7 +352,7 @@ mod tests {
             let mut images = images.clone();
             images[1].size = (copy.width(), copy.height());
             let views = [views[0].clone(), SweepView::new(views[1].camera.clone(), copy)];
-            let found = same_picture(&images, Some(&views)).unwrap();
+            let found = same_picture(&images, &geometry, Some(&views)).unwrap();
             assert_eq!(found, Some(ImagePair::new(0, 1)), "copy {number}");
         }
     }

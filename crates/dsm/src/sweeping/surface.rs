@@ -123,53 +123,62 @@ impl SurfaceCounts {
 /// [`DsmError::Cancelled`].
 pub(crate) fn make_surface(
     input: SurfaceInput<'_>,
-    views: Vec<SweepView>,
+    mut views: Vec<SweepView>,
     heights: SceneHeights,
     progress: &dyn Progress,
 ) -> Result<(ChunkRasters, SurfaceCounts), DsmError> {
     let SurfaceInput { config, sweep, useful, grid, .. } = input;
-    let all: Vec<Heights<'_>> = heights
-        .maps
-        .iter()
-        .enumerate()
-        .filter(|(i, _)| !sweep.sources[*i].is_empty())
-        .map(|(index, map)| Heights { index, view: &views[index], map })
-        .collect();
+    let finest = sweep.levels.finest;
     let projection = grid.projection()?;
     let map_from_ground = |g: geodesy::LonLatHeight| projection.map_from_lonlat(g.lon_deg, g.lat_deg).ok();
     let frame = GridFrame { geotransform: grid.geotransform, map_from_ground: &map_from_ground };
-    let level = sweep.levels.finest as u32;
+    let level = finest as u32;
     let jump_m = same_surface_m(sweep, grid);
-    let (side_m, step_m) = (input.pixel_m * f64::from(1u32 << level), sweep.step_at(sweep.levels.finest));
-    let mut placed = Vec::with_capacity(all.len());
+    let (side_m, step_m) = (input.pixel_m * f64::from(1u32 << level), sweep.step_at(finest));
+    let SceneHeights { mut maps, .. } = heights;
+    let origin_m = maps[0].origin_m;
+    views.iter_mut().for_each(|view| view.keep_level(finest));
+    let mut placed = Vec::with_capacity(maps.len());
+    let mut pixels = Vec::with_capacity(maps.len());
     let mut kept = vec![KeptPixels::default(); views.len()];
     let mut blind = Grid::filled(grid.size.0, grid.size.1, false);
-    for own in &all {
-        progress.check_cancelled()?;
-        let blank = own.view.blank(sweep.levels.finest);
-        let mut keep = agreeing(*own, &witnesses(*own, &all, useful, &sweep.sources), level)?;
-        drop_at_rim(&mut keep, own.map, sweep.range, sweep.step_at(sweep.levels.finest));
-        let mut shows_nothing = blank.clone();
-        if let Some(asked) = config.height_range_m {
-            drop_outside(&mut keep, own.map, asked);
-            let heights = own.map.height_m.data();
-            shows_nothing.data_mut().iter_mut().zip(heights).for_each(|(m, h)| *m |= is_outside(own.map, *h, asked));
+    for index in 0..views.len() {
+        if !sweep.sources[index].is_empty() {
+            progress.check_cancelled()?;
+            let all = with_heights(sweep, &views, &maps);
+            let own = Heights { index, view: &views[index], map: &maps[index] };
+            let blank = own.view.blank(finest);
+            let mut keep = agreeing(own, &witnesses(own, &all, useful, &sweep.sources), level)?;
+            drop_at_rim(&mut keep, own.map, sweep.range, step_m);
+            let mut shows_nothing = blank.clone();
+            if let Some(asked) = config.height_range_m {
+                drop_outside(&mut keep, own.map, asked);
+                let heights = own.map.height_m.data();
+                shows_nothing
+                    .data_mut()
+                    .iter_mut()
+                    .zip(heights)
+                    .for_each(|(m, h)| *m |= is_outside(own.map, *h, asked));
+            }
+            mark_cells(own, level, &shows_nothing, &frame, &mut blind)?;
+            let data = keep.data();
+            kept[index] = KeptPixels {
+                kept: data.iter().filter(|k| **k).count() as u64,
+                all: data.len() as u64,
+                shadows: ShadowCounts::of(&own.view.levels[finest], own.map, &keep, side_m, step_m),
+            };
+            placed.push(place_view(own, level, &keep, &blank, jump_m, &frame)?);
+            progress.step();
         }
-        mark_cells(*own, level, &shows_nothing, &frame, &mut blind)?;
-        let data = keep.data();
-        kept[own.index] = KeptPixels {
-            kept: data.iter().filter(|k| **k).count() as u64,
-            all: data.len() as u64,
-            shadows: ShadowCounts::of(&own.view.levels[sweep.levels.finest], own.map, &keep, side_m, step_m),
-        };
-        placed.push(place_view(*own, level, &keep, &blank, jump_m, &frame)?);
-        progress.step();
+        // Images and height maps are the most of a run's memory. Of a view that is placed, the
+        // others need its heights only, and the grid what its image shows.
+        if is_matched(sweep, index) {
+            pixels.push(ViewPixels::of(&views[index], finest));
+        }
+        views[index].keep_level(usize::MAX);
+        maps[index].keep_heights();
     }
-    let origin_m = heights.maps[0].origin_m;
-    // Images and height maps are the most of a run's memory, and the fusion takes some of its own.
-    drop(all);
-    drop(heights);
-    let pixels = matched_pixels(sweep, &views);
+    drop(maps);
     drop(views);
     let (rasters, counts) = fuse(input, placed, &blind, &pixels, origin_m)?;
     progress.step();
@@ -217,11 +226,15 @@ fn fuse(
     Ok((rasters, counts))
 }
 
-/// Returns the pixels of the views that were compared with others.
-fn matched_pixels(sweep: &SceneSweep, views: &[SweepView]) -> Vec<ViewPixels> {
-    let is_matched = |i: usize| !sweep.sources[i].is_empty() || sweep.sources.iter().any(|s| s.contains(&i));
-    let matched = views.iter().enumerate().filter(|(i, _)| is_matched(*i));
-    matched.map(|(_, view)| ViewPixels::of(view, sweep.levels.finest)).collect()
+/// Returns the views that have heights of their own.
+fn with_heights<'a>(sweep: &SceneSweep, views: &'a [SweepView], maps: &'a [HeightMap]) -> Vec<Heights<'a>> {
+    let all = maps.iter().zip(views).enumerate().filter(|(i, _)| !sweep.sources[*i].is_empty());
+    all.map(|(index, (map, view))| Heights { index, view, map }).collect()
+}
+
+/// Returns whether a view was compared with others.
+fn is_matched(sweep: &SceneSweep, view: usize) -> bool {
+    !sweep.sources[view].is_empty() || sweep.sources.iter().any(|s| s.contains(&view))
 }
 
 /// Returns the distance up to which heights on the grid may belong to one surface, metres.

@@ -87,6 +87,11 @@ impl LaidSource {
             bicubic_along(source.image, from, [next[0] - from[0], next[1] - from[1]], out);
         }
         let has_voids = kernels::quantise(grey, FULL * census_scale(source), OVERHANG, &mut self.picture);
+        if has_voids && grey.iter().all(|value| value.is_nan()) {
+            // The source shows another place: its costs are invalid without being computed.
+            self.map = None;
+            return;
+        }
         self.voids.mark(grey, self.stride, CUBIC_TAPS + 2 * MARGIN, has_voids);
     }
 

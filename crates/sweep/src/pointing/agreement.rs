@@ -181,7 +181,7 @@ fn evened(view: &SweepView) -> SweepView {
     let variance = gaussian(&combined(&high, &high, &|a, b| a * b), EVEN_PX);
     let even = combined(&high, &variance, &|value, variance| value / (variance + noise).sqrt());
     // No patch is flat now. Those that were hold noise, which the correlation tells.
-    SweepView { camera: view.camera.clone(), levels: vec![even], noise: 0.0, contrast: Vec::new() }
+    SweepView { camera: view.camera.clone(), levels: vec![even], noise: 0.0, contrast: Vec::new(), first: view.first }
 }
 
 /// Returns the median height of the ties nearest to a place.

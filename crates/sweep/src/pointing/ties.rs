@@ -142,6 +142,7 @@ fn scaled(view: &SweepView, skipped: usize) -> Cow<'_, SweepView> {
         levels: view.levels[skipped..].to_vec(),
         noise: view.noise_at(skipped),
         contrast: view.contrast[skipped..].to_vec(),
+        first: view.first.map(|at| at >> skipped),
     })
 }
 
