@@ -1,10 +1,15 @@
 //! Shifts that differ from place to place: jitter, drifts and seams that one translation leaves.
 //!
-//! The surfaces are divided into blocks. Each quarter of a block finds its own shift from its slopes
-//! (Nuth and Kääb 2011), which a few walls tell, and the mean of the quarters is that of the block. Their spread tells how well it is known. The variance of
-//! the blocks' shifts beyond what this explains is that of true local shifts, τ². A shift with the
-//! variance σ² counts by τ² / (τ² + σ²), the least expected error for normal deviations (James and
-//! Stein 1961). So surfaces without local shifts stay as they are, whatever their noise.
+//! The surfaces are divided into blocks. Each block is divided into tiles like a chessboard, and the
+//! tiles of either colour find a shift for themselves: the one with the least NMAD of the
+//! differences. The block's shift is their mean, and how far they differ tells how well it is known.
+//! A flat block tells less than a steep one, so the variance of a block is taken as inverse to the
+//! sum of its squared slopes, with one factor that the differences of all blocks give.
+//!
+//! Shifts that noise explains are not applied. The variance τ² of the true shifts between blocks
+//! follows from the scatter of the found ones beyond their own variances (DerSimonian and Laird
+//! 1986, Controlled Clinical Trials 7, 177-188). A shift with the variance σ² counts by
+//! τ² / (τ² + σ²) against the mean of all blocks, the least expected error (James and Stein 1961).
 
 use std::ops::Range;
 
@@ -13,24 +18,21 @@ use raster::Grid;
 use rayon::prelude::*;
 
 use crate::alignment::align::MetresFromCells;
-use crate::alignment::nuth_kaab::NuthKaab;
-use crate::alignment::registration::{cut, differences};
+use crate::alignment::registration::{cut, own_shift};
 use crate::alignment::resample::bilinear;
 use crate::error::EvalError;
 
-/// Quarters along each side of a block.
-const QUARTERS: usize = 2;
-/// Shortest side of a block, cells: its quarters still have slopes in several directions beside
-/// the farthest shift.
+/// Tiles along each side of a block: eight of each colour, so that both colours cover the block.
+const TILES: usize = 4;
+/// Shortest side of a block, cells: its tiles still hold whole walls and slopes.
 const LEAST_SIDE: usize = 96;
-/// Least number of quarters whose spread is used.
-const LEAST_QUARTERS: usize = 3;
-/// Farthest that a quarter is moved, cells: a few times what slopes of roof edges, blurred over two
-/// cells, tell at once.
-const FARTHEST_CELLS: f64 = 8.0;
-/// Cells of the test that are kept around a quarter, so that every shift has the same cells of the
+/// Farthest that a block is searched, cells: jitter of some pixels, beside the shift of the whole.
+const FARTHEST_CELLS: usize = 8;
+/// Cells of the test that are kept around a block, so that every shift has the same cells of the
 /// reference.
-const RIM: usize = FARTHEST_CELLS as usize + 2;
+const RIM: usize = FARTHEST_CELLS + 2;
+/// Median of the square of a normal deviate.
+const MEDIAN_SQUARE: f64 = 0.454_936;
 
 /// A shift for each cell of a surface, to be added to it.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,10 +41,10 @@ pub struct LocalShifts {
     shifts: Grid<[f64; 3]>,
     /// Columns and rows of a block.
     side: (f64, f64),
-    /// Number of blocks that found a shift of their own; the others take those beside them.
+    /// Number of blocks that found a shift of their own; the others take the mean of all.
     pub found: usize,
-    /// Standard deviations of the true local shifts along x, y and z, metres. 0 where noise
-    /// explains all.
+    /// Standard deviations of the true shifts between blocks along x, y and z, metres. 0 where
+    /// noise explains what was found.
     pub deviation_m: [f64; 3],
     /// Largest shift sideways and largest shift up or down, metres.
     pub largest_m: (f64, f64),
@@ -53,8 +55,8 @@ impl LocalShifts {
     /// that are aligned as a whole, in blocks of about `block_m` metres.
     ///
     /// # Errors
-    /// [`EvalError::BlockTooSmall`]; [`EvalError::NoLocalShift`] where no block has relief that
-    /// both surfaces share.
+    /// [`EvalError::BlockTooSmall`]; [`EvalError::NoLocalShift`] where no block has heights of both
+    /// surfaces.
     pub fn find(
         test: &Grid<f32>,
         reference: &Grid<f32>,
@@ -69,32 +71,32 @@ impl LocalShifts {
         let count = |cells: usize, cell_m: f64| ((cells as f64 * cell_m / block_m).round() as usize).max(1);
         let (columns, rows) = (count(reference.width(), along_columns), count(reference.height(), along_rows));
         let blocks = Blocks { size: (reference.width(), reference.height()), columns, rows };
-        let sideways = |bounds: &[Range<usize>; 2]| slope_shift(test, reference, metres, bounds);
-        let (levelled, found, tau) = blocks.shifts(sideways);
+
+        let sideways = blocks.each(|bounds| sideways(test, reference, metres, bounds));
+        let found = sideways.iter().flatten().count();
         if found == 0 {
             return Err(EvalError::NoLocalShift { blocks: columns * rows });
         }
-        let side = (reference.width() as f64 / columns as f64, reference.height() as f64 / rows as f64);
+        let ([along_x, along_y], deviation_x, deviation_y) = {
+            let (x, deviation_x) = shrunk(&axis(&sideways, 0));
+            let (y, deviation_y) = shrunk(&axis(&sideways, 1));
+            ([x, y], deviation_x, deviation_y)
+        };
+        let shifts = along_x.iter().zip(&along_y).map(|(x, y)| [*x, *y, 0.0]).collect();
         let mut local = Self {
-            shifts: levelled.map(|shift| [shift[0], shift[1], 0.0]),
-            side,
+            shifts: Grid::from_vec(columns, rows, shifts).unwrap_or_else(|| Grid::filled(columns, rows, [0.0; 3])),
+            side: (reference.width() as f64 / columns as f64, reference.height() as f64 / rows as f64),
             found,
             deviation_m: [0.0; 3],
             largest_m: (0.0, 0.0),
         };
         let errors = local.errors(test, reference);
-        let upwards = |bounds: &[Range<usize>; 2]| {
-            let [columns, rows] = bounds;
-            let inside = rows.clone().flat_map(|row| &errors.row(row)[columns.clone()]);
-            upper_median(&mut inside.filter(|e| e.is_finite()).map(|&e| f64::from(e)).collect::<Vec<f64>>())
-                .map(|up| [-up])
-        };
-        let (up, _, tau_up) = blocks.shifts(upwards);
-        for (shift, up) in local.shifts.data_mut().iter_mut().zip(up.data()) {
-            shift[2] = up[0];
+        let (upwards, deviation_z) = shrunk(&axis(&blocks.each(|bounds| upwards(&errors, bounds)), 0));
+        for (shift, up) in local.shifts.data_mut().iter_mut().zip(upwards) {
+            shift[2] = up;
         }
-        let (x, y) = metres.apply(tau[0], tau[1]);
-        local.deviation_m = [x.abs(), y.abs(), tau_up[0]];
+        let (x, y) = metres.apply(deviation_x, deviation_y);
+        local.deviation_m = [x.abs(), y.abs(), deviation_z];
         for shift in local.shifts.data() {
             let (x, y) = metres.apply(shift[0], shift[1]);
             local.largest_m = (local.largest_m.0.max(x.hypot(y)), local.largest_m.1.max(shift[2].abs()));
@@ -137,23 +139,118 @@ impl LocalShifts {
     }
 }
 
-/// Finds the shift of a part of the test from the slopes of the reference, columns and rows. `None`
-/// where they do not tell it.
-fn slope_shift(
+/// What the tiles of the two colours of a block find along an axis, and how much the block tells.
+#[derive(Debug, Clone, Copy)]
+struct Found {
+    halves: [f64; 2],
+    /// Inverse to the variance but for a factor.
+    information: f64,
+}
+
+impl Found {
+    fn mean(&self) -> f64 {
+        0.5 * (self.halves[0] + self.halves[1])
+    }
+
+    /// Square of the standard error of the mean, as the two halves show it.
+    fn own_variance(&self) -> f64 {
+        0.25 * (self.halves[0] - self.halves[1]).powi(2)
+    }
+}
+
+fn axis<const N: usize>(blocks: &[Option<[Found; N]>], axis: usize) -> Vec<Option<Found>> {
+    blocks.iter().map(|block| block.map(|found| found[axis])).collect()
+}
+
+/// Returns the shifts of all blocks along an axis, and the standard deviation of the true ones.
+fn shrunk(blocks: &[Option<Found>]) -> (Vec<f64>, f64) {
+    let mut scaled: Vec<f64> = blocks.iter().flatten().map(|found| found.own_variance() * found.information).collect();
+    let factor = upper_median(&mut scaled).unwrap_or(0.0) / MEDIAN_SQUARE;
+    // A block whose halves differ by more than its slopes explain is known as its halves say.
+    let variance = |found: &Found| (factor / found.information).max(found.own_variance()).max(f64::MIN_POSITIVE);
+    let known: Vec<(f64, f64)> = blocks.iter().flatten().map(|found| (found.mean(), variance(found))).collect();
+    let between = true_variance(&known);
+    let mean = weighted_mean(&known, between);
+    let shift = |found: &Option<Found>| {
+        let Some(found) = found else { return mean };
+        mean + (found.mean() - mean) * between / (between + variance(found))
+    };
+    (blocks.iter().map(shift).collect(), between.sqrt())
+}
+
+/// Returns the mean of values, each with its variance, whose true values have a variance of their
+/// own.
+fn weighted_mean(known: &[(f64, f64)], between: f64) -> f64 {
+    let (sum, weights) = known.iter().fold((0.0, 0.0), |(sum, weights), (value, variance)| {
+        let weight = 1.0 / (variance + between);
+        (sum + weight * value, weights + weight)
+    });
+    sum / weights
+}
+
+/// Returns the variance of the true values beyond the variance of each (DerSimonian and Laird 1986,
+/// eq. 8).
+fn true_variance(known: &[(f64, f64)]) -> f64 {
+    let mean = weighted_mean(known, 0.0);
+    let sum = |power: i32| known.iter().map(|(_, variance)| variance.recip().powi(power)).sum::<f64>();
+    let spread: f64 = known.iter().map(|(value, variance)| (value - mean).powi(2) / variance).sum();
+    let excess = (spread - (known.len() as f64 - 1.0)) / (sum(1) - sum(2) / sum(1));
+    if excess.is_finite() { excess.max(0.0) } else { 0.0 }
+}
+
+/// Finds the shift of a block along columns and rows.
+fn sideways(
     test: &Grid<f32>,
     reference: &Grid<f32>,
     metres: MetresFromCells,
     bounds: &[Range<usize>; 2],
-) -> Option<[f64; 2]> {
-    let (along_columns, along_rows) = metres.cell_size_m();
-    let reference = cut(reference, bounds, [0; 2], RIM);
+) -> Option<[Found; 2]> {
     let wide = bounds.each_ref().map(|bound| bound.start..bound.end + 2 * RIM);
     let test = cut(test, &wide, [-(RIM as isize); 2], 0);
-    let at = |(columns, rows): (f64, f64)| differences(&test, &reference, [columns, rows]);
-    let found = NuthKaab { reference: &reference, metres_from_cells: metres, differences: &at };
-    let (cells, summary) = found.run(FARTHEST_CELLS * along_columns.max(along_rows)).ok()?;
-    let is_near = cells.0.hypot(cells.1) <= FARTHEST_CELLS;
-    (summary.converged && is_near).then_some([cells.0, cells.1])
+    let whole = cut(reference, bounds, [0; 2], RIM);
+    let half = |colour: usize| {
+        let mut kept = whole.clone();
+        let width = kept.width();
+        for (at, height) in kept.data_mut().iter_mut().enumerate() {
+            if !has_colour(bounds, [at % width, at / width].map(|at| at.saturating_sub(RIM)), colour) {
+                *height = f32::NAN;
+            }
+        }
+        own_shift(&test, &kept, metres, FARTHEST_CELLS)
+    };
+    let halves = [half(0)?, half(1)?];
+    let mut slopes = [0.0; 2];
+    for (row, next) in (1..whole.height()).map(|row| (row - 1, row)) {
+        let pairs = whole.row(row).iter().zip(&whole.row(row)[1..]).zip(whole.row(next));
+        for ((height, right), below) in pairs {
+            let steps = [right - height, below - height].map(f64::from);
+            if steps.iter().all(|step| step.is_finite()) {
+                (0..2).for_each(|axis| slopes[axis] += steps[axis] * steps[axis]);
+            }
+        }
+    }
+    let known = slopes.iter().all(|slope| *slope > 0.0);
+    known.then(|| [0, 1].map(|axis| Found { halves: halves.map(|half| half[axis]), information: slopes[axis] }))
+}
+
+/// Finds the shift of a block upwards, from errors that no shift sideways is left in.
+fn upwards(errors: &Grid<f32>, bounds: &[Range<usize>; 2]) -> Option<[Found; 1]> {
+    let mut halves: [Vec<f64>; 2] = Default::default();
+    for row in bounds[1].clone() {
+        for (column, error) in errors.row(row)[bounds[0].clone()].iter().enumerate().filter(|(_, e)| e.is_finite()) {
+            let colour = usize::from(!has_colour(bounds, [column, row - bounds[1].start], 0));
+            halves[colour].push(-f64::from(*error));
+        }
+    }
+    let information = (halves[0].len() + halves[1].len()) as f64;
+    let [first, second] = &mut halves;
+    Some([Found { halves: [upper_median(first)?, upper_median(second)?], information }])
+}
+
+/// Returns whether the tile of a cell, counted from the corner of its block, has a colour.
+fn has_colour(bounds: &[Range<usize>; 2], cell: [usize; 2], colour: usize) -> bool {
+    let tile = |axis: usize| cell[axis] * TILES / bounds[axis].len().max(1);
+    (tile(0) + tile(1)) % 2 == colour
 }
 
 /// Blocks of a surface.
@@ -164,80 +261,18 @@ struct Blocks {
     rows: usize,
 }
 
-/// What a block found along each axis, and its variance.
-type Found<const N: usize> = ([f64; N], [f64; N]);
-
 impl Blocks {
-    /// Returns the columns and the rows of a quarter of a block.
-    fn quarter(&self, block: usize, quarter: usize) -> [Range<usize>; 2] {
-        let range = |size: usize, count: usize, block: usize, quarter: usize| {
-            let bound = |k: usize| k * size / (QUARTERS * count);
-            bound(QUARTERS * block + quarter)..bound(QUARTERS * block + quarter + 1)
+    /// Calls `of_block` with the columns and the rows of every block.
+    fn each<T: Send>(&self, of_block: impl Fn(&[Range<usize>; 2]) -> Option<T> + Sync) -> Vec<Option<T>> {
+        let range = |size: usize, count: usize, k: usize| k * size / count..(k + 1) * size / count;
+        let bounds = |block: usize| {
+            [
+                range(self.size.0, self.columns, block % self.columns),
+                range(self.size.1, self.rows, block / self.columns),
+            ]
         };
-        [
-            range(self.size.0, self.columns, block % self.columns, quarter % QUARTERS),
-            range(self.size.1, self.rows, block / self.columns, quarter / QUARTERS),
-        ]
+        (0..self.columns * self.rows).into_par_iter().map(|block| of_block(&bounds(block))).collect()
     }
-
-    /// Returns the shift of every block from what its quarters find, the number of blocks that
-    /// found one, and the standard deviation of the true shifts along each axis.
-    fn shifts<const N: usize>(
-        &self,
-        of_quarter: impl Fn(&[Range<usize>; 2]) -> Option<[f64; N]> + Sync,
-    ) -> (Grid<[f64; N]>, usize, [f64; N]) {
-        let block = |block: usize| -> Option<Found<N>> {
-            let quarters = (0..QUARTERS * QUARTERS).filter_map(|quarter| of_quarter(&self.quarter(block, quarter)));
-            let quarters: Vec<[f64; N]> = quarters.collect();
-            (quarters.len() >= LEAST_QUARTERS).then(|| mean_and_variance(&quarters))
-        };
-        let found: Vec<Option<Found<N>>> = (0..self.columns * self.rows).into_par_iter().map(block).collect();
-        let known: Vec<&Found<N>> = found.iter().flatten().collect();
-        let tau2 = true_variance(&known);
-        let shrunk = |(mean, variance): &Found<N>| -> [f64; N] {
-            std::array::from_fn(|axis| match tau2[axis] {
-                tau2 if tau2 > 0.0 => mean[axis] * tau2 / (tau2 + variance[axis]),
-                _ => 0.0,
-            })
-        };
-        let shifts: Vec<Option<[f64; N]>> = found.iter().map(|found| found.as_ref().map(shrunk)).collect();
-        (self.completed(shifts), known.len(), tau2.map(f64::sqrt))
-    }
-
-    /// Gives blocks without a shift the mean of those beside them, from the known ones outwards.
-    fn completed<const N: usize>(&self, mut shifts: Vec<Option<[f64; N]>>) -> Grid<[f64; N]> {
-        let (columns, rows) = (self.columns, self.rows);
-        while shifts.iter().any(Option::is_none) && shifts.iter().any(Option::is_some) {
-            let beside = |at: usize| {
-                let (column, row) = (at % columns, at / columns);
-                let near = |k: usize, count: usize| k.saturating_sub(1)..(k + 2).min(count);
-                let known = near(row, rows).flat_map(|r| near(column, columns).map(move |c| r * columns + c));
-                let known: Vec<[f64; N]> = known.filter_map(|at| shifts[at]).collect();
-                (!known.is_empty()).then(|| mean_and_variance(&known).0)
-            };
-            shifts = (0..shifts.len()).map(|at| shifts[at].or_else(|| beside(at))).collect();
-        }
-        let shifts = shifts.into_iter().map(|shift| shift.unwrap_or([0.0; N])).collect();
-        Grid::from_vec(columns, rows, shifts).unwrap_or_else(|| Grid::filled(columns, rows, [0.0; N]))
-    }
-}
-
-/// Returns the mean of values along each axis, and its variance.
-fn mean_and_variance<const N: usize>(values: &[[f64; N]]) -> Found<N> {
-    let count = values.len() as f64;
-    let mean: [f64; N] = std::array::from_fn(|axis| values.iter().map(|value| value[axis]).sum::<f64>() / count);
-    let squares = |axis: usize| values.iter().map(|value| (value[axis] - mean[axis]).powi(2)).sum::<f64>();
-    (mean, std::array::from_fn(|axis| squares(axis) / ((count - 1.0).max(1.0) * count)))
-}
-
-/// Returns the mean square of the shifts beyond what their variances explain, along each axis. The
-/// surfaces are aligned as a whole, so the true shifts have no mean.
-fn true_variance<const N: usize>(found: &[&Found<N>]) -> [f64; N] {
-    let count = found.len().max(1) as f64;
-    std::array::from_fn(|axis| {
-        let excess = found.iter().map(|(mean, variance)| mean[axis].powi(2) - variance[axis]).sum::<f64>();
-        (excess / count).max(0.0)
-    })
 }
 
 #[cfg(test)]

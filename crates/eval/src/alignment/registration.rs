@@ -208,29 +208,36 @@ impl<'a> Parts<'a> {
         metres: MetresFromCells,
         shift: [f64; 2],
     ) -> Option<[f64; 3]> {
-        let (along_columns, along_rows) = metres.cell_size_m();
-        let radius_m = PART_RADIUS_CELLS as f64 * along_columns.max(along_rows);
         let moved = shift.map(|cells| -cells.round() as isize);
         let part = |k: usize| {
             let bounds = self.bounds(k);
             let inside = cut(self.errors, &bounds, [0; 2], 0);
             let up = upper_median(&mut finite(&inside))?;
             let reference = cut(reference, &bounds, [0; 2], RIM);
-            let own = Levels::new(
-                &cut(test, &grown(&bounds), moved.map(|cells| cells - RIM as isize), 0),
-                &reference,
-                metres,
-                radius_m,
-            );
-            let (start, _) = own.search(radius_m, PART_CELLS).ok()?;
-            let (_, best) = own.at(0).finest(&around(&[start]), &[start], PART_POSITIONS);
-            let (x, y) = metres.apply(best.columns, best.rows);
+            let test = cut(test, &grown(&bounds), moved.map(|cells| cells - RIM as isize), 0);
+            let [columns, rows] = own_shift(&test, &reference, metres, PART_RADIUS_CELLS)?;
+            let (x, y) = metres.apply(columns, rows);
             Some([x, y, up])
         };
         let found: Vec<[f64; 3]> = (0..PARTS * PARTS).into_par_iter().filter_map(part).collect();
         let along = |axis: usize| standard_error(&found.iter().map(|shift| shift[axis]).collect::<Vec<f64>>());
         (found.len() >= PARTS).then(|| [0, 1, 2].map(along))
     }
+}
+
+/// Returns the shift of a small surface within some cells, columns and rows.
+pub(super) fn own_shift(
+    test: &Grid<f32>,
+    reference: &Grid<f32>,
+    metres: MetresFromCells,
+    radius_cells: usize,
+) -> Option<[f64; 2]> {
+    let (along_columns, along_rows) = metres.cell_size_m();
+    let radius_m = radius_cells as f64 * along_columns.max(along_rows);
+    let own = Levels::new(test, reference, metres, radius_m);
+    let (start, _) = own.search(radius_m, PART_CELLS).ok()?;
+    let (_, best) = own.at(0).finest(&around(&[start]), &[start], PART_POSITIONS);
+    Some([best.columns, best.rows])
 }
 
 /// Returns the standard error of the mean of some values.
