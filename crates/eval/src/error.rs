@@ -64,7 +64,7 @@ pub enum EvalError {
     },
     /// No block found a shift of its own.
     #[error(
-        "none of {blocks} blocks has relief that both surfaces share: choose larger blocks, or align the surfaces as a whole"
+        "none of {blocks} blocks has heights and slopes of both surfaces: choose larger blocks, or align the surfaces as a whole"
     )]
     NoLocalShift {
         /// Number of blocks.

@@ -331,7 +331,7 @@ mod tests {
     }
 
     #[test]
-    fn blocks_without_relief_take_the_shift_beside_them_and_ground_without_any_is_refused() {
+    fn blocks_without_heights_take_the_mean_and_surfaces_without_any_are_refused() {
         let drift = |_: f64, row: f64| [if row < 240.0 { 1.5 } else { -1.5 }, 0.0, 0.0];
         let (mut reference, test) = (hills(5, 0.2, |_, _| [0.0; 3]), hills(6, 0.2, drift));
         for row in 0..120 {
@@ -339,9 +339,8 @@ mod tests {
         }
         let found = LocalShifts::find(&test, &reference, metres(), 60.0).unwrap();
         assert_eq!(found.found, 15);
-        // Beside it lie a block that is moved as it is, and others that are moved the other way.
         let (beside, filled) = (found.at(180.0, 60.0)[0], found.at(20.0, 20.0)[0]);
-        assert!((beside + 1.5).abs() < 0.1 && filled < -0.3, "{beside} {filled}");
+        assert!((beside + 1.5).abs() < 0.1 && filled.abs() < 0.2, "{beside} {filled}");
         let void = reference.map(|_| f32::NAN);
         let refused = LocalShifts::find(&test, &void, metres(), 60.0);
         assert!(matches!(refused, Err(EvalError::NoLocalShift { blocks: 16 })), "{refused:?}");
