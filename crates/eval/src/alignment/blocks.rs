@@ -1,8 +1,8 @@
 //! Shifts that differ from place to place: jitter, drifts and seams that one translation leaves.
 //!
 //! The surfaces are divided into blocks. Each block is divided into tiles like a chessboard, and the
-//! tiles of either colour find a shift for themselves: the one with the least NMAD of the
-//! differences. The block's shift is their mean, and how far they differ tells how well it is known.
+//! tiles of either colour find a shift for themselves: the one with the least mean of the clipped
+//! differences, which a few walls on much flat ground tell. The block's shift is their mean, and how far they differ tells how well it is known.
 //! A flat block tells less than a steep one, so the variance of a block is taken as inverse to the
 //! sum of its squared slopes, with one factor that the differences of all blocks give.
 //!
@@ -13,13 +13,14 @@
 
 use std::ops::Range;
 
-use numeric::upper_median;
+use numeric::{upper_median, upper_nmad};
 use raster::Grid;
 use rayon::prelude::*;
 
 use crate::alignment::align::MetresFromCells;
-use crate::alignment::registration::{cut, own_shift};
+use crate::alignment::registration::{cut, differences, finite, own_shift};
 use crate::alignment::resample::bilinear;
+use crate::alignment::search::Measure;
 use crate::error::EvalError;
 
 /// Tiles along each side of a block: eight of each colour, so that both colours cover the block.
@@ -31,6 +32,11 @@ const FARTHEST_CELLS: usize = 8;
 /// Cells of the test that are kept around a block, so that every shift has the same cells of the
 /// reference.
 const RIM: usize = FARTHEST_CELLS + 2;
+/// Magnitude at which differences are clipped, NMADs of all: noise is kept whole.
+const CLIP_NMADS: f64 = 3.0;
+/// Least magnitude at which differences are clipped, metres for each metre of a cell's side:
+/// surfaces without noise still show how steep a wall is.
+const LEAST_CLIP: f64 = 0.2;
 /// Median of the square of a normal deviate.
 const MEDIAN_SQUARE: f64 = 0.454_936;
 
@@ -72,7 +78,10 @@ impl LocalShifts {
         let (columns, rows) = (count(reference.width(), along_columns), count(reference.height(), along_rows));
         let blocks = Blocks { size: (reference.width(), reference.height()), columns, rows };
 
-        let sideways = blocks.each(|bounds| sideways(test, reference, metres, bounds));
+        let mut all = finite(&differences(test, reference, [0.0; 2]));
+        let noise_m = CLIP_NMADS * upper_nmad(&mut all).unwrap_or(0.0);
+        let measure = Measure::ClippedMean(noise_m.max(LEAST_CLIP * along_columns.max(along_rows)));
+        let sideways = blocks.each(|bounds| sideways(test, reference, metres, bounds, measure));
         let found = sideways.iter().flatten().count();
         if found == 0 {
             return Err(EvalError::NoLocalShift { blocks: columns * rows });
@@ -204,6 +213,7 @@ fn sideways(
     reference: &Grid<f32>,
     metres: MetresFromCells,
     bounds: &[Range<usize>; 2],
+    measure: Measure,
 ) -> Option<[Found; 2]> {
     let wide = bounds.each_ref().map(|bound| bound.start..bound.end + 2 * RIM);
     let test = cut(test, &wide, [-(RIM as isize); 2], 0);
@@ -216,7 +226,7 @@ fn sideways(
                 *height = f32::NAN;
             }
         }
-        own_shift(&test, &kept, metres, FARTHEST_CELLS)
+        own_shift(&test, &kept, metres, FARTHEST_CELLS, measure)
     };
     let halves = [half(0)?, half(1)?];
     let mut slopes = [0.0; 2];
