@@ -81,7 +81,17 @@ impl LocalShifts {
         let mut all = finite(&differences(test, reference, [0.0; 2]));
         let noise_m = CLIP_NMADS * upper_nmad(&mut all).unwrap_or(0.0);
         let measure = Measure::ClippedMean(noise_m.max(LEAST_CLIP * along_columns.max(along_rows)));
-        let sideways = blocks.each(|bounds| sideways(test, reference, metres, bounds, measure));
+        let around =
+            |start: [isize; 2]| blocks.each(|bounds| sideways(test, reference, metres, bounds, start, measure));
+        let mut sideways = around([0; 2]);
+        // Where the shift of the whole is off by cells, the blocks are searched around their median.
+        let start = [0, 1].map(|axis| {
+            let mut shifts: Vec<f64> = sideways.iter().flatten().map(|found| found[axis].mean()).collect();
+            upper_median(&mut shifts).unwrap_or(0.0).round() as isize
+        });
+        if start != [0; 2] {
+            sideways = around(start);
+        }
         let found = sideways.iter().flatten().count();
         if found == 0 {
             return Err(EvalError::NoLocalShift { blocks: columns * rows });
@@ -106,11 +116,28 @@ impl LocalShifts {
         }
         let (x, y) = metres.apply(deviation_x, deviation_y);
         local.deviation_m = [x.abs(), y.abs(), deviation_z];
-        for shift in local.shifts.data() {
-            let (x, y) = metres.apply(shift[0], shift[1]);
-            local.largest_m = (local.largest_m.0.max(x.hypot(y)), local.largest_m.1.max(shift[2].abs()));
-        }
+        local.measure(metres);
         Ok(local)
+    }
+
+    /// Takes the mean of all blocks out, and returns it: metres along x, y and z.
+    pub fn take_mean(&mut self, metres: MetresFromCells) -> [f64; 3] {
+        let count = self.blocks() as f64;
+        let mean = [0, 1, 2].map(|axis| self.shifts.data().iter().map(|shift| shift[axis]).sum::<f64>() / count);
+        for shift in self.shifts.data_mut() {
+            (0..3).for_each(|axis| shift[axis] -= mean[axis]);
+        }
+        self.measure(metres);
+        let (x, y) = metres.apply(mean[0], mean[1]);
+        [x, y, mean[2]]
+    }
+
+    fn measure(&mut self, metres: MetresFromCells) {
+        self.largest_m = (0.0, 0.0);
+        for shift in self.shifts.data() {
+            let (x, y) = metres.apply(shift[0], shift[1]);
+            self.largest_m = (self.largest_m.0.max(x.hypot(y)), self.largest_m.1.max(shift[2].abs()));
+        }
     }
 
     /// Number of blocks.
@@ -207,16 +234,17 @@ fn true_variance(known: &[(f64, f64)]) -> f64 {
     if excess.is_finite() { excess.max(0.0) } else { 0.0 }
 }
 
-/// Finds the shift of a block along columns and rows.
+/// Finds the shift of a block along columns and rows, around a start.
 fn sideways(
     test: &Grid<f32>,
     reference: &Grid<f32>,
     metres: MetresFromCells,
     bounds: &[Range<usize>; 2],
+    start: [isize; 2],
     measure: Measure,
 ) -> Option<[Found; 2]> {
     let wide = bounds.each_ref().map(|bound| bound.start..bound.end + 2 * RIM);
-    let test = cut(test, &wide, [-(RIM as isize); 2], 0);
+    let test = cut(test, &wide, start.map(|cells| -cells - RIM as isize), 0);
     let whole = cut(reference, bounds, [0; 2], RIM);
     let half = |colour: usize| {
         let mut kept = whole.clone();
@@ -227,6 +255,7 @@ fn sideways(
             }
         }
         own_shift(&test, &kept, metres, FARTHEST_CELLS, measure)
+            .map(|found| [0, 1].map(|axis| found[axis] + start[axis] as f64))
     };
     let halves = [half(0)?, half(1)?];
     let mut slopes = [0.0; 2];
@@ -330,6 +359,44 @@ mod tests {
         assert!(rms[0] < 0.35 && rms[1] < 0.05 && rms[2] < 0.15, "{rms:?}");
         assert!(found.deviation_m[0] > 0.5 && found.deviation_m[1] < 0.02, "{:?}", found.deviation_m);
         assert!((0.7..1.1).contains(&found.largest_m.0) && found.largest_m.1 > 0.5, "{:?}", found.largest_m);
+    }
+
+    /// Few houses on flat ground, with noise, moved by a shift that differs from row to row.
+    fn houses(noise: u64, shift: impl Fn(f64) -> f64) -> Grid<f32> {
+        let height = |i: usize| {
+            let (column, row) = ((i % SIZE) as f64, (i / SIZE) as f64);
+            let (x, y) = (column - shift(row), row);
+            let plot = ((x / 60.0).floor() as i64 * 97 + (y / 60.0).floor() as i64) as u64;
+            let is_house = hash64(plot) % 5 == 0 && x.rem_euclid(60.0) < 24.0 && y.rem_euclid(60.0) < 30.0;
+            let error = unit_interval(hash64((i as u64) << 8 ^ noise)) - 0.5;
+            (if is_house { 7.0 } else { 0.0 } + 0.1 * error) as f32
+        };
+        Grid::from_vec(SIZE, SIZE, (0..SIZE * SIZE).map(height).collect()).unwrap()
+    }
+
+    #[test]
+    fn flat_blocks_take_no_part() {
+        let wave = |row: f64| 3.0 * (row / 100.0).sin();
+        let (reference, test) = (houses(7, |_| 0.0), houses(8, wave));
+        let found = LocalShifts::find(&test, &reference, metres(), 60.0).unwrap();
+        let worst = (0..48 * 48).map(|i| {
+            let (column, row) = ((i % 48) as f64 * 10.0, (i / 48) as f64 * 10.0);
+            let at = found.at(column, row);
+            at[0].hypot(at[1])
+        });
+        let worst = worst.fold(0.0, f64::max);
+        assert!(worst < 3.5 && found.deviation_m[1] < 0.1, "{worst} {:?} {:?}", found.deviation_m, found.shifts);
+    }
+
+    #[test]
+    fn a_shift_of_the_whole_that_is_cells_off_is_made_good() {
+        let wave = |_: f64, row: f64| [7.0 + 2.0 * (row / 120.0).sin(), 0.0, 0.0];
+        let (reference, test) = (hills(1, 0.6, |_, _| [0.0; 3]), hills(2, 0.6, wave));
+        let mut found = LocalShifts::find(&test, &reference, metres(), 48.0).unwrap();
+        // The mean of the wave over all rows is 7.83 cells of half a metre.
+        let mean = found.take_mean(metres());
+        assert!((-3.95..-3.88).contains(&mean[0]) && mean[1].abs() < 0.05 && mean[2].abs() < 0.1, "{mean:?}");
+        assert!(found.largest_m.0 < 1.5, "{:?}", found.largest_m);
     }
 
     #[test]

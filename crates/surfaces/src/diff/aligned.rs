@@ -173,8 +173,12 @@ fn co_registered(
         LocalShifts::find(&found.aligned, observed.as_ref().unwrap_or(reference), metres, block_m)
             .map_err(DiffError::Alignment)
     });
-    let cells = metres.cells(found.shift.dx_m, found.shift.dy_m);
-    let movement = Movement { shift: found.shift, cells, local: local.transpose()? };
+    let (mut shift, mut local) = (found.shift, local.transpose()?);
+    if let Some(local) = &mut local {
+        let [dx_m, dy_m, dz_m] = local.take_mean(metres);
+        shift = Shift { dx_m: shift.dx_m + dx_m, dy_m: shift.dy_m + dy_m, dz_m: shift.dz_m + dz_m };
+    }
+    let movement = Movement { shift, cells: metres.cells(shift.dx_m, shift.dy_m), local };
     inputs.notes.extend(note.map(str::to_owned));
     Ok(movement)
 }
