@@ -28,6 +28,9 @@ pub(crate) struct Args {
     /// Radius of the horizontal search of --align xyz and nuth-kaab, in metres.
     #[arg(long, value_name = "METRES", default_value_t = 5.0)]
     search_m: f64,
+    /// Side of blocks that are moved on their own after that, in metres: against jitter and drifts.
+    #[arg(long, value_name = "METRES")]
+    align_blocks: Option<f64>,
     /// Standard deviation of the heights of a surface without sigma.tif beside it, in metres.
     #[arg(long, value_name = "METRES")]
     sigma_m: Option<f64>,
@@ -74,6 +77,7 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
     let mut config = DiffConfig::new(args.before.clone(), args.after.clone(), args.output.clone());
     (config.alignment, config.search_m, config.sigma_m) = (args.align, args.search_m, args.sigma_m);
+    config.block_m = args.align_blocks;
     config.change.confidence = args.confidence;
     config.change.least_change_m = args.least_change_m;
     config.change.least_area_m2 = args.least_area_m2;

@@ -54,6 +54,22 @@ pub enum EvalError {
     /// A geotransform cannot be inverted, or holds values that are not finite.
     #[error("the geotransform {0:?} cannot be inverted: a grid needs cells with an area")]
     SingularGeotransform([f64; 6]),
+    /// Blocks for local shifts are too small to have relief of their own.
+    #[error("blocks of {block_m} m are too small for local shifts: at least {least_m} m are needed on these cells")]
+    BlockTooSmall {
+        /// Side of a block, metres.
+        block_m: f64,
+        /// Shortest side, metres.
+        least_m: f64,
+    },
+    /// No block found a shift of its own.
+    #[error(
+        "none of {blocks} blocks has heights and slopes of both surfaces: choose larger blocks, or align the surfaces as a whole"
+    )]
+    NoLocalShift {
+        /// Number of blocks.
+        blocks: usize,
+    },
     /// A threshold or a radius is not a positive finite number.
     #[error("{name} is {value}, expected a positive number of metres")]
     NotPositive {

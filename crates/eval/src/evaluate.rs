@@ -5,7 +5,7 @@ use crate::alignment::align::{AlignmentMethod, MetresFromCells, Shift};
 use crate::alignment::cell_map::CellMap;
 use crate::alignment::nuth_kaab::{NuthKaab, NuthKaabSummary};
 use crate::alignment::resample::{bilinear, nearest};
-use crate::alignment::search::{Search, SearchSummary};
+use crate::alignment::search::{Measure, Search, SearchSummary};
 use crate::error::EvalError;
 use crate::measures::breakdown::{Cells, ClassMetrics, CoverageMetrics, EdgeMetrics, SlopeMetrics};
 use crate::measures::calibration::{Reliability, SigmaReport, reliability, sigma_report};
@@ -312,7 +312,7 @@ fn horizontal_shift(input: &EvalInput<'_>, config: &EvalConfig) -> Result<Horizo
         AlignmentMethod::None | AlignmentMethod::Z => Ok(HorizontalShift::default()),
         AlignmentMethod::Xyz => {
             let (test, test_from_reference) = (input.test, input.test_from_reference);
-            let search = Search { reference, test, test_from_reference, metres_from_cells };
+            let search = Search { reference, test, test_from_reference, metres_from_cells, measure: Measure::Nmad };
             let (cells, summary) = search.run(config.search_m)?;
             Ok(HorizontalShift { cells, search: Some(summary), nuth_kaab: None })
         }

@@ -24,6 +24,7 @@ mod surface;
 mod vertical;
 
 pub use alignment::align::{AlignmentMethod, MetresFromCells, Shift};
+pub use alignment::blocks::LocalShifts;
 pub use alignment::cell_map::CellMap;
 pub use alignment::nuth_kaab::NuthKaabSummary;
 pub use alignment::registration::{Registration, register_surfaces};

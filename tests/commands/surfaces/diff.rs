@@ -166,3 +166,43 @@ fn what_cannot_be_compared_is_refused_with_a_reason() {
     refused(&surface, &["--areas", "none.geojson"], "none.geojson");
     refused(&surface, &["--after-vertical", "egm2008", "--align", "none"], "egm2008");
 }
+
+/// Jitter of the second surface, a wave along its rows, is no change where blocks are moved on
+/// their own.
+#[test]
+fn jitter_is_removed_by_blocks() {
+    let folder = tempfile::tempdir().unwrap();
+    let later = folder.path().join("later.tif");
+    let surface = read_dem(town().join("dsm.tif")).unwrap();
+    let (width, height) = (surface.heights.width(), surface.heights.height());
+    let moved = (0..width * height).map(|at| {
+        let (column, row) = ((at % width) as f64, (at / width) as f64);
+        let noise = 0.1 * ((at * 7919 % 1013) as f32 / 1013.0 - 0.5);
+        let (sideways, up) = (3.0 * (row / 100.0).sin(), 0.002 * (row - 320.0));
+        eval::bilinear(&surface.heights, column - sideways, row).map_or(f32::NAN, |h| (h + up) as f32 + noise)
+    });
+    let moved = Grid::from_vec(width, height, moved.collect()).unwrap();
+    let bands = [Band { description: "height_m", data: BandData::F32(&moved) }];
+    let crs = Crs::ellipsoidal(surface.horizontal_epsg.unwrap());
+    write_cog(&later, &CogRaster::new(&bands, surface.geotransform, crs), false).unwrap();
+    let run = |name: &str, options: &[&str]| {
+        let mut command = skysweep();
+        command.arg("diff").arg(town().join("dsm.tif")).arg(&later).arg("-o").arg(folder.path().join(name));
+        command.args(["--sigma-m", "0.1", "--progress", "none", "--json"]).args(options).assert()
+    };
+    let report = |name: &str, options: &[&str]| -> Value {
+        serde_json::from_slice(&run(name, options).code(0).get_output().stdout).unwrap()
+    };
+    let whole = report("whole", &[]);
+    assert!(whole["blocks"].is_null());
+    let blocks = report("blocks", &["--align-blocks", "64"]);
+    let found = &blocks["blocks"];
+    assert_eq!(found["count"], 25);
+    assert!((0.8..2.0).contains(&found["largest_sideways_m"].as_f64().unwrap()), "{found}");
+    let spread = |report: &Value| report["detection_m"].as_f64().unwrap();
+    assert!(spread(&blocks) < 0.5 * spread(&whole), "{} {}", spread(&blocks), spread(&whole));
+    assert_eq!(blocks["regions"].as_array().unwrap().len(), 0, "{}", blocks["regions"]);
+    let page = std::fs::read_to_string(folder.path().join("blocks/diff.html")).unwrap();
+    assert!(page.contains("moved by blocks"));
+    run("small", &["--align-blocks", "10"]).code(2).stderr(predicate::str::contains("too small"));
+}

@@ -18,7 +18,7 @@ use rayon::prelude::*;
 use crate::alignment::align::{MetresFromCells, Shift};
 use crate::alignment::cell_map::CellMap;
 use crate::alignment::resample::bilinear;
-use crate::alignment::search::{Candidate, FINALISTS, Search, at_edge, contrast};
+use crate::alignment::search::{Candidate, FINALISTS, Measure, Search, at_edge, contrast};
 use crate::error::EvalError;
 
 /// Surfaces are averaged until the search has a radius of at most this many cells.
@@ -91,7 +91,7 @@ pub fn register_surfaces(
     metres_from_cells: MetresFromCells,
     search_m: f64,
 ) -> Result<Registration, EvalError> {
-    let levels = Levels::new(test, reference, metres_from_cells, search_m);
+    let levels = Levels::new(test, reference, metres_from_cells, search_m, Measure::Nmad);
     let (start, coarse) = levels.search(search_m, CELLS)?;
     let finest = levels.at(0);
     let steps = around(&[start]);
@@ -126,10 +126,11 @@ struct Levels {
     surfaces: Vec<[Grid<f32>; 2]>,
     cells: CellMap,
     metres: MetresFromCells,
+    measure: Measure,
 }
 
 impl Levels {
-    fn new(test: &Grid<f32>, reference: &Grid<f32>, metres: MetresFromCells, search_m: f64) -> Self {
+    fn new(test: &Grid<f32>, reference: &Grid<f32>, metres: MetresFromCells, search_m: f64, measure: Measure) -> Self {
         let mut surfaces = vec![[test.clone(), reference.clone()]];
         let (along_columns, along_rows) = metres.cell_size_m();
         let mut radius = search_m / along_columns.min(along_rows);
@@ -140,13 +141,13 @@ impl Levels {
             surfaces.push(next);
             radius *= 0.5;
         }
-        Self { surfaces, cells: CellMap::identity(), metres }
+        Self { surfaces, cells: CellMap::identity(), metres, measure }
     }
 
     fn at(&self, level: usize) -> Search<'_> {
         let [test, reference] = &self.surfaces[level];
         let metres_from_cells = self.metres.scaled((level as f64).exp2());
-        Search { reference, test, test_from_reference: &self.cells, metres_from_cells }
+        Search { reference, test, test_from_reference: &self.cells, metres_from_cells, measure: self.measure }
     }
 
     /// Returns the best whole-cell shift of the finest level.
@@ -208,29 +209,37 @@ impl<'a> Parts<'a> {
         metres: MetresFromCells,
         shift: [f64; 2],
     ) -> Option<[f64; 3]> {
-        let (along_columns, along_rows) = metres.cell_size_m();
-        let radius_m = PART_RADIUS_CELLS as f64 * along_columns.max(along_rows);
         let moved = shift.map(|cells| -cells.round() as isize);
         let part = |k: usize| {
             let bounds = self.bounds(k);
             let inside = cut(self.errors, &bounds, [0; 2], 0);
             let up = upper_median(&mut finite(&inside))?;
             let reference = cut(reference, &bounds, [0; 2], RIM);
-            let own = Levels::new(
-                &cut(test, &grown(&bounds), moved.map(|cells| cells - RIM as isize), 0),
-                &reference,
-                metres,
-                radius_m,
-            );
-            let (start, _) = own.search(radius_m, PART_CELLS).ok()?;
-            let (_, best) = own.at(0).finest(&around(&[start]), &[start], PART_POSITIONS);
-            let (x, y) = metres.apply(best.columns, best.rows);
+            let test = cut(test, &grown(&bounds), moved.map(|cells| cells - RIM as isize), 0);
+            let [columns, rows] = own_shift(&test, &reference, metres, PART_RADIUS_CELLS, Measure::Nmad)?;
+            let (x, y) = metres.apply(columns, rows);
             Some([x, y, up])
         };
         let found: Vec<[f64; 3]> = (0..PARTS * PARTS).into_par_iter().filter_map(part).collect();
         let along = |axis: usize| standard_error(&found.iter().map(|shift| shift[axis]).collect::<Vec<f64>>());
         (found.len() >= PARTS).then(|| [0, 1, 2].map(along))
     }
+}
+
+/// Returns the shift of a small surface within some cells, columns and rows.
+pub(super) fn own_shift(
+    test: &Grid<f32>,
+    reference: &Grid<f32>,
+    metres: MetresFromCells,
+    radius_cells: usize,
+    measure: Measure,
+) -> Option<[f64; 2]> {
+    let (along_columns, along_rows) = metres.cell_size_m();
+    let radius_m = radius_cells as f64 * along_columns.max(along_rows);
+    let own = Levels::new(test, reference, metres, radius_m, measure);
+    let (start, _) = own.search(radius_m, PART_CELLS).ok()?;
+    let (_, best) = own.at(0).finest(&around(&[start]), &[start], PART_POSITIONS);
+    Some([best.columns, best.rows])
 }
 
 /// Returns the standard error of the mean of some values.
@@ -248,7 +257,7 @@ fn grown(bounds: &[Range<usize>; 2]) -> [Range<usize>; 2] {
 
 /// Cuts the cells that lie `moved` columns and rows from a part out of a grid, and puts a rim
 /// without values around them.
-fn cut(grid: &Grid<f32>, [columns, rows]: &[Range<usize>; 2], moved: [isize; 2], rim: usize) -> Grid<f32> {
+pub(crate) fn cut(grid: &Grid<f32>, [columns, rows]: &[Range<usize>; 2], moved: [isize; 2], rim: usize) -> Grid<f32> {
     let mut out = Grid::filled(columns.len() + 2 * rim, rows.len() + 2 * rim, f32::NAN);
     for (row, from) in rows.clone().enumerate() {
         let at =
@@ -261,7 +270,7 @@ fn cut(grid: &Grid<f32>, [columns, rows]: &[Range<usize>; 2], moved: [isize; 2],
 }
 
 /// Returns test − reference, the test moved by some cells; NaN where either is void.
-fn differences(test: &Grid<f32>, reference: &Grid<f32>, [columns, rows]: [f64; 2]) -> Grid<f32> {
+pub(crate) fn differences(test: &Grid<f32>, reference: &Grid<f32>, [columns, rows]: [f64; 2]) -> Grid<f32> {
     let mut out = Grid::filled(reference.width(), reference.height(), f32::NAN);
     let width = reference.width().max(1);
     out.data_mut().par_chunks_mut(width).enumerate().for_each(|(row, out)| {
@@ -273,7 +282,7 @@ fn differences(test: &Grid<f32>, reference: &Grid<f32>, [columns, rows]: [f64; 2
     out
 }
 
-fn finite(errors: &Grid<f32>) -> Vec<f64> {
+pub(super) fn finite(errors: &Grid<f32>) -> Vec<f64> {
     errors.data().iter().filter(|error| error.is_finite()).map(|error| f64::from(*error)).collect()
 }
 

@@ -22,7 +22,7 @@ use crate::alignment::resample::bilinear;
 use crate::alignment::smooth::smoothed;
 use crate::error::EvalError;
 use numeric::random::hash64;
-use numeric::upper_nmad;
+use numeric::{upper_median, upper_nmad};
 use raster::Grid;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -76,6 +76,32 @@ pub(crate) struct Search<'a> {
     pub(crate) test: &'a Grid<f32>,
     pub(crate) test_from_reference: &'a CellMap,
     pub(crate) metres_from_cells: MetresFromCells,
+    pub(crate) measure: Measure,
+}
+
+/// What the best shift makes least, of the differences without their median.
+#[derive(Clone, Copy, PartialEq)]
+pub(crate) enum Measure {
+    /// The NMAD, which ignores up to half of the cells.
+    Nmad,
+    /// The mean of the magnitudes, none of which counts more than this many metres. It sees a few
+    /// walls on much flat ground, and what changed costs every shift the same.
+    ClippedMean(f64),
+}
+
+impl Measure {
+    fn of(self, differences: &mut [f32]) -> f64 {
+        match self {
+            Self::Nmad => upper_nmad(differences).unwrap_or(f64::INFINITY),
+            Self::ClippedMean(most_m) => {
+                let Some(median) = upper_median(differences).filter(|_| !differences.is_empty()) else {
+                    return f64::INFINITY;
+                };
+                let magnitude = |d: &f32| f64::from((d - median).abs()).min(most_m);
+                differences.iter().map(magnitude).sum::<f64>() / differences.len() as f64
+            }
+        }
+    }
 }
 
 /// Position on the reference, in cells, and the height there.
@@ -92,7 +118,7 @@ pub(crate) struct Candidate {
     pub(crate) columns: f64,
     pub(crate) rows: f64,
     pub(crate) n: usize,
-    pub(crate) nmad: f64,
+    pub(crate) score: f64,
 }
 
 impl Search<'_> {
@@ -136,7 +162,7 @@ impl Search<'_> {
         let large = smooth.scattered(&self.cells_near_test(steps), count);
         let finalists: Vec<Candidate> =
             ranked.par_iter().take(FINALISTS).map(|c| smooth.candidate(&large, c.columns, c.rows)).collect();
-        let nowhere = Candidate { columns: 0.0, rows: 0.0, n: 0, nmad: f64::INFINITY };
+        let nowhere = Candidate { columns: 0.0, rows: 0.0, n: 0, score: f64::INFINITY };
         let start = finalists.into_iter().fold(nowhere, better);
         (start, smooth.levelled(&large, smooth.refined(&large, start)))
     }
@@ -222,7 +248,7 @@ impl Search<'_> {
         };
         let mut differences: Vec<f32> = samples.iter().filter_map(difference).collect();
         let n = differences.len();
-        Candidate { columns, rows, n, nmad: upper_nmad(&mut differences).unwrap_or(f64::INFINITY) }
+        Candidate { columns, rows, n, score: self.measure.of(&mut differences) }
     }
 
     /// Refines a shift by compass search: it moves to the best of eight neighbours while that
@@ -241,12 +267,12 @@ impl Search<'_> {
                 c.n >= least && columns.abs().max(rows.abs()) <= MOST_REFINEMENT_CELLS
             };
             let next = around.into_iter().filter(within).fold(best, better);
-            if next.nmad < best.nmad { best = next } else { step /= 2.0 }
+            if next.score < best.score { best = next } else { step /= 2.0 }
         }
         best
     }
 
-    /// Returns the vertex of the paraboloid through NMAD² around a minimum. It averages the
+    /// Returns the vertex of the paraboloid through the squared score around a minimum. It averages the
     /// roughness that noise gives to the criterion. Returns the minimum itself if it is clearly
     /// better (surfaces without noise), or if there is no vertex.
     fn levelled(&self, samples: &[Sample], minimum: Candidate) -> Candidate {
@@ -254,12 +280,12 @@ impl Search<'_> {
             (0..25).map(|i| (f64::from(i % 5 - 2) * FIT_STEP_CELLS, f64::from(i / 5 - 2) * FIT_STEP_CELLS)).collect();
         let criterion = |&(c, r): &(f64, f64)| {
             let candidate = self.candidate(samples, minimum.columns + c, minimum.rows + r);
-            candidate.nmad.powi(2)
+            candidate.score.powi(2)
         };
         let values: Vec<f64> = stencil.par_iter().map(criterion).collect();
         let Some((columns, rows)) = vertex(&stencil, &values) else { return minimum };
         let levelled = self.candidate(samples, minimum.columns + columns, minimum.rows + rows);
-        if levelled.nmad <= CLEARLY_BETTER * minimum.nmad { levelled } else { minimum }
+        if levelled.score <= CLEARLY_BETTER * minimum.score { levelled } else { minimum }
     }
 }
 
@@ -287,7 +313,7 @@ fn vertex(places: &[(f64, f64)], values: &[f64]) -> Option<(f64, f64)> {
 
 /// Returns the second of two candidates if it is strictly better, the first otherwise.
 fn better(a: Candidate, b: Candidate) -> Candidate {
-    if b.nmad < a.nmad { b } else { a }
+    if b.score < a.score { b } else { a }
 }
 
 /// Returns the candidates that overlap enough, best first. Equal ones keep their order (shortest
@@ -295,15 +321,15 @@ fn better(a: Candidate, b: Candidate) -> Candidate {
 fn ranked(mut candidates: Vec<Candidate>) -> Vec<Candidate> {
     let most = candidates.iter().map(|c| c.n).max().unwrap_or(0);
     candidates.retain(|c| c.n > 0 && c.n as f64 >= LEAST_OVERLAP * most as f64);
-    candidates.sort_by(|a, b| a.nmad.total_cmp(&b.nmad));
+    candidates.sort_by(|a, b| a.score.total_cmp(&b.score));
     candidates
 }
 
-/// Returns the NMAD of the middle candidate divided by the first; 1 if every shift fits equally.
+/// Returns the score of the middle candidate divided by the first; 1 if every shift fits equally.
 pub(crate) fn contrast(ranked: &[Candidate]) -> f64 {
     match (ranked.first(), ranked.get(ranked.len() / 2)) {
-        (Some(first), Some(middle)) if first.nmad > 0.0 => middle.nmad / first.nmad,
-        (Some(_), Some(middle)) if middle.nmad > 0.0 => f64::MAX,
+        (Some(first), Some(middle)) if first.score > 0.0 => middle.score / first.score,
+        (Some(_), Some(middle)) if middle.score > 0.0 => f64::MAX,
         _ => 1.0,
     }
 }

@@ -1,6 +1,6 @@
 //! The two surfaces on one grid: read, co-registered, with deviations and observed cells.
 
-use eval::{AlignmentMethod, CellOrigin, EvalConfig, EvalInput, Evaluation, Shift, evaluate, nearest};
+use eval::{AlignmentMethod, CellMap, CellOrigin, EvalConfig, EvalInput, LocalShifts, Shift, evaluate, nearest};
 use numeric::Progress;
 use raster::Grid;
 
@@ -36,6 +36,8 @@ pub(super) struct Aligned {
     pub(super) probability: Option<Grid<f32>>,
     /// Shift that was added to the second surface.
     pub(super) shift: Shift,
+    /// Shifts by block that were added to it besides, if they were asked for.
+    pub(super) local: Option<LocalShifts>,
     /// Side of a cell, metres.
     pub(super) cell_m: f64,
     /// Whether both surfaces come with the layers of a run of this toolkit.
@@ -57,12 +59,8 @@ impl Aligned {
         let of_before = layers.origins.as_ref().map(|origins| origins.map(is_observed));
         let of_after = inputs.layers.origins.as_ref().map(|origins| origins.map(is_observed));
         let found = co_registered(config, &mut inputs, of_before.as_ref(), of_after.as_ref())?;
-        let cells = inputs.metres_from_cells.cells(found.shift.dx_m, found.shift.dy_m);
         let (width, height) = (inputs.reference.heights.width(), inputs.reference.heights.height());
-        let place = |at: usize| {
-            let (column, row) = ((at % width) as f64, (at / width) as f64);
-            inputs.test_from_reference.position(column - cells.0, row - cells.1)
-        };
+        let place = |at: usize| found.place(&inputs.test_from_reference, (at % width) as f64, (at / width) as f64).0;
         let mut observed = Grid::filled(width, height, true);
         for (at, observed) in observed.data_mut().iter_mut().enumerate() {
             let (x, y) = place(at);
@@ -104,23 +102,52 @@ impl Aligned {
         }
         let cell_m = inputs.metres_from_cells.cell_area_m2().sqrt();
         let is_own = layers.origins.is_some() && inputs.layers.origins.is_some();
-        Ok(Self { after: found.aligned, sigma, observed, probability, shift: found.shift, cell_m, is_own, inputs })
+        // All heights, filled ones too.
+        let after = found.heights(&inputs);
+        let Movement { shift, local, .. } = found;
+        Ok(Self { after, sigma, observed, probability, shift, local, cell_m, is_own, inputs })
+    }
+}
+
+/// How the second surface is moved.
+struct Movement {
+    shift: Shift,
+    /// The shift in columns and rows.
+    cells: (f64, f64),
+    local: Option<LocalShifts>,
+}
+
+impl Movement {
+    /// Returns the position in the second surface of a cell of the first, and what is added to its
+    /// height there.
+    fn place(&self, after_from_before: &CellMap, column: f64, row: f64) -> ((f64, f64), f64) {
+        let local = self.local.as_ref().map_or([0.0; 3], |local| local.at(column, row));
+        let position = after_from_before.position(column - self.cells.0 - local[0], row - self.cells.1 - local[1]);
+        (position, self.shift.dz_m + local[2])
+    }
+
+    /// Returns the second surface at the cells of the first.
+    fn heights(&self, inputs: &GridInputs) -> Grid<f32> {
+        let (width, height) = (inputs.reference.heights.width(), inputs.reference.heights.height());
+        let mut moved = Grid::filled(width, height, f32::NAN);
+        for (at, out) in moved.data_mut().iter_mut().enumerate() {
+            let ((x, y), dz_m) = self.place(&inputs.test_from_reference, (at % width) as f64, (at / width) as f64);
+            *out = eval::bilinear(&inputs.test.heights, x, y).map_or(f32::NAN, |h| (h + dz_m) as f32);
+        }
+        moved
     }
 }
 
 /// Finds the shift on the observed cells, and again on those that the first shift leaves within a
-/// few deviations, so that changes do not pull it.
+/// few deviations, so that changes do not pull it. Local shifts are found on all observed cells:
+/// the first shift leaves large errors at just those edges that tell them.
 fn co_registered(
     config: &DiffConfig,
     inputs: &mut GridInputs,
     before: Option<&Grid<bool>>,
     after: Option<&Grid<bool>>,
-) -> Result<Evaluation, DiffError> {
-    let mut test = inputs.test.heights.clone();
-    if let Some(observed) = after {
-        let cells = test.data_mut().iter_mut().zip(observed.data());
-        cells.filter(|(_, observed)| !**observed).for_each(|(height, _)| *height = f32::NAN);
-    }
+) -> Result<Movement, DiffError> {
+    let test = after.map_or_else(|| inputs.test.heights.clone(), |mask| observed_of(&inputs.test.heights, mask));
     let mut settings = EvalConfig::default();
     (settings.alignment, settings.search_m) = (config.alignment, config.search_m);
     let (reference, cells, metres) = (&inputs.reference.heights, &inputs.test_from_reference, inputs.metres_from_cells);
@@ -128,39 +155,40 @@ fn co_registered(
         evaluate(&EvalInput { mask, ..EvalInput::new(test, reference, cells, metres) }, settings)
             .map_err(DiffError::Alignment)
     };
-    let first = run(&test, before, &settings)?;
-    let mut errors: Vec<f32> = first.errors.data().iter().copied().filter(|e| e.is_finite()).collect();
+    let mut found = run(&test, before, &settings)?;
+    let mut errors: Vec<f32> = found.errors.data().iter().copied().filter(|e| e.is_finite()).collect();
     let limit = (STABLE_NMADS * numeric::upper_nmad(&mut errors).unwrap_or(0.0) as f32).max(STABLE_MIN_M);
-    let is_stable = |error: &f32| error.abs() <= limit;
-    let shift = match config.alignment {
-        AlignmentMethod::None => first.shift,
-        _ => {
-            let second = run(&test, Some(&first.errors.map(is_stable)), &settings)?;
-            if let Some(search) = second.search.filter(|search| search.at_edge || search.contrast < FLAT) {
-                inputs.notes.push(match search.at_edge {
-                    true => "the best shift lies at the edge of the search: search further".into(),
-                    false => "the ground is so flat that the horizontal shift is uncertain".into(),
-                });
-            }
-            second.shift
-        }
-    };
-    // All heights, filled ones too, at the shift that was found.
-    let moved = cells_moved(inputs, shift);
-    Ok(Evaluation { shift, aligned: moved, ..first })
+    let is_stable = found.errors.map(|error| error.abs() <= limit);
+    let mut note = None;
+    if config.alignment != AlignmentMethod::None {
+        found = run(&test, Some(&is_stable), &settings)?;
+        note = found.search.and_then(|search| match search {
+            search if search.at_edge => Some("the best shift lies at the edge of the search: search further"),
+            search if search.contrast < FLAT => Some("the ground is so flat that the horizontal shift is uncertain"),
+            _ => None,
+        });
+    }
+    let local = config.block_m.map(|block_m| {
+        let observed = before.map(|mask| observed_of(reference, mask));
+        LocalShifts::find(&found.aligned, observed.as_ref().unwrap_or(reference), metres, block_m)
+            .map_err(DiffError::Alignment)
+    });
+    let (mut shift, mut local) = (found.shift, local.transpose()?);
+    if let Some(local) = &mut local {
+        let [dx_m, dy_m, dz_m] = local.take_mean(metres);
+        shift = Shift { dx_m: shift.dx_m + dx_m, dy_m: shift.dy_m + dy_m, dz_m: shift.dz_m + dz_m };
+    }
+    let movement = Movement { shift, cells: metres.cells(shift.dx_m, shift.dy_m), local };
+    inputs.notes.extend(note.map(str::to_owned));
+    Ok(movement)
 }
 
-/// Returns the second surface at the cells of the first, moved by a shift.
-fn cells_moved(inputs: &GridInputs, shift: Shift) -> Grid<f32> {
-    let cells = inputs.metres_from_cells.cells(shift.dx_m, shift.dy_m);
-    let (width, height) = (inputs.reference.heights.width(), inputs.reference.heights.height());
-    let mut moved = Grid::filled(width, height, f32::NAN);
-    for (at, out) in moved.data_mut().iter_mut().enumerate() {
-        let (column, row) = ((at % width) as f64, (at / width) as f64);
-        let (x, y) = inputs.test_from_reference.position(column - cells.0, row - cells.1);
-        *out = eval::bilinear(&inputs.test.heights, x, y).map_or(f32::NAN, |h| (h + shift.dz_m) as f32);
-    }
-    moved
+/// Returns heights without those of cells that are not observed.
+fn observed_of(heights: &Grid<f32>, observed: &Grid<bool>) -> Grid<f32> {
+    let mut kept = heights.clone();
+    let cells = kept.data_mut().iter_mut().zip(observed.data());
+    cells.filter(|(_, observed)| !**observed).for_each(|(height, _)| *height = f32::NAN);
+    kept
 }
 
 /// Combines the deviations of both surfaces. A surface without a raster of deviations has the

@@ -25,6 +25,10 @@ pub struct DiffConfig {
     pub alignment: AlignmentMethod,
     /// Radius of the horizontal search, metres.
     pub search_m: f64,
+    /// Side of blocks that are moved on their own after the shift, metres: against jitter and
+    /// drifts, which one shift leaves. `None` moves the surface as a whole.
+    #[serde(default)]
+    pub block_m: Option<f64>,
     /// Standard deviation of the heights of a surface without a `sigma.tif` beside it, metres.
     #[serde(default)]
     pub sigma_m: Option<f64>,
@@ -70,6 +74,7 @@ impl DiffConfig {
             output,
             alignment: AlignmentMethod::Xyz,
             search_m: 5.0,
+            block_m: None,
             sigma_m: None,
             use_filled: false,
             before_vertical: None,

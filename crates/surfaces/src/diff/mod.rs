@@ -25,5 +25,5 @@ mod run;
 
 pub use config::DiffConfig;
 pub use error::DiffError;
-pub use report::{AreaVolume, DiffRegion, DiffReport};
+pub use report::{AreaVolume, DiffBlocks, DiffRegion, DiffReport};
 pub use run::run;

@@ -152,7 +152,8 @@ fn table(title: &str, heads: &[&str], rows: Vec<Vec<String>>) -> JobTable {
 fn evidence(report: &DiffReport) -> Vec<(String, String)> {
     let shift = &report.shift;
     let fact = |name: &str, text: String| (name.to_owned(), text);
-    vec![
+    let blocks = report.blocks.iter().map(|blocks| fact("moved by blocks", blocks.text()));
+    let facts = vec![
         fact("map", format!("{}, heights above: {}", report.crs, report.vertical)),
         fact(
             "second surface moved by",
@@ -166,7 +167,8 @@ fn evidence(report: &DiffReport) -> Vec<(String, String)> {
         fact("deviation of an offset of all heights", format!("{} m", sensible(report.offset_sigma_m, "m"))),
         fact("net volume of all cells", with_sigma(report.total.net_m3, report.total.net_sigma_m3, "m³")),
         fact("area without heights", format!("{} m²", sensible(report.total.unknown_m2, "m²"))),
-    ]
+    ];
+    facts.into_iter().chain(blocks).collect()
 }
 
 fn parameters(report: &DiffReport) -> Vec<(String, String)> {

@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::path::PathBuf;
 
 use change::{ChangeConfig, ChangeRegion, ErrorCorrelation, Volume};
-use eval::Shift;
+use eval::{LocalShifts, Shift};
 use serde::Serialize;
 
 /// Most regions that the text lists.
@@ -58,6 +58,9 @@ pub struct DiffReport {
     pub cell_m: f64,
     /// Shift that was added to the second surface, metres.
     pub shift: Shift,
+    /// What blocks were moved by besides, if that was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub blocks: Option<DiffBlocks>,
     /// Factor that the stated deviations needed to explain the differences of unchanged ground.
     pub sigma_factor: f64,
     /// Median level of detection of a cell at the confidence, metres.
@@ -84,6 +87,41 @@ pub struct DiffReport {
     pub parameters: ChangeConfig,
     /// Choices and doubts that a reader must know.
     pub notes: Vec<String>,
+}
+
+/// Local shifts of the second surface, after the shift of the whole.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct DiffBlocks {
+    /// Side of the blocks as asked for, metres.
+    pub side_m: f64,
+    /// Number of blocks.
+    pub count: usize,
+    /// Blocks that found a shift of their own; the others take those beside them.
+    pub found: usize,
+    /// Standard deviations of the true local shifts east, north and up, metres; 0 where noise
+    /// explains what was found.
+    pub deviation_m: [f64; 3],
+    /// Largest local shift sideways, metres.
+    pub largest_sideways_m: f64,
+    /// Largest local shift up or down, metres.
+    pub largest_up_m: f64,
+}
+
+impl DiffBlocks {
+    pub(super) fn new(side_m: f64, local: &LocalShifts) -> Self {
+        let (largest_sideways_m, largest_up_m) = local.largest_m;
+        let (count, found, deviation_m) = (local.blocks(), local.found, local.deviation_m);
+        Self { side_m, count, found, deviation_m, largest_sideways_m, largest_up_m }
+    }
+
+    /// Returns the blocks in words.
+    pub(super) fn text(&self) -> String {
+        format!(
+            "{} of {} blocks of {} m found a shift of their own, up to {:.2} m sideways and {:.2} m up or down",
+            self.found, self.count, self.side_m, self.largest_sideways_m, self.largest_up_m
+        )
+    }
 }
 
 impl DiffReport {
@@ -115,6 +153,9 @@ impl DiffReport {
             self.total.loss_sigma_m3,
         );
         // Writing to a string does not fail.
+        if let Some(blocks) = &self.blocks {
+            let _ = writeln!(text, "blocks  {}", blocks.text());
+        }
         for region in self.regions.iter().take(LISTED) {
             let (n, found) = (region.number, &region.found);
             let _ = writeln!(

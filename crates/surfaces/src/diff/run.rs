@@ -14,7 +14,7 @@ use super::config::DiffConfig;
 use super::error::DiffError;
 use super::layers::{of_areas, of_regions};
 use super::page;
-use super::report::{DiffRegion, DiffReport};
+use super::report::{DiffBlocks, DiffRegion, DiffReport};
 use job::files::{self, FileError};
 use job::output_folder::OutputFolder;
 use job::report_page;
@@ -141,6 +141,7 @@ fn finish(
         size: (width, height),
         cell_m: aligned.cell_m,
         shift: aligned.shift,
+        blocks: config.block_m.zip(aligned.local.as_ref()).map(|(side_m, local)| DiffBlocks::new(side_m, local)),
         sigma_factor: change.sigma_factor,
         detection_m: change.detection_m,
         offset_sigma_m: change.offset_sigma_m,
