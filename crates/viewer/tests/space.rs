@@ -54,7 +54,7 @@ fn splats(origin: Option<LocalOrigin>) -> SplatFile {
     };
     let splats = vec![splat; 3];
     let harmonics = SplatHarmonics::new(1, (0..27).map(|i| i as f32 / 8.0).collect());
-    SplatFile { splats, harmonics, layout: SplatLayout { form: SplatForm::Discs, sh_degree: 1 }, origin }
+    SplatFile { splats, harmonics, labels: None, layout: SplatLayout { form: SplatForm::Discs, sh_degree: 1 }, origin }
 }
 
 fn origin(x: f64) -> LocalOrigin {
