@@ -130,7 +130,10 @@ mod tests {
     #[test]
     fn other_objects_and_virtual_surfaces_give_no_label() {
         let mut mesh = joined(cuboid([0.0; 3], [8.0, 6.0, 3.0]), &cuboid([12.0, 0.0, 0.0], [8.0, 6.0, 3.0]));
-        mesh.surfaces.iter_mut().filter(|s| s.class == SurfaceClass::Roof).for_each(|s| s.class = SurfaceClass::Closure);
+        mesh.surfaces
+            .iter_mut()
+            .filter(|s| s.class == SurfaceClass::Roof)
+            .for_each(|s| s.class = SurfaceClass::Closure);
         let model = PriorModel::new(mesh, &[true, false]).unwrap();
         let splats = [[4.0, 3.0, 3.0], [4.0, 0.1, 1.5], [16.0, 0.1, 1.5]].map(|at| disc(at, LEVEL, [0.1; 3]));
         let found = splat_labels(&model, &splats, &Similarity::IDENTITY, 0.5).unwrap();

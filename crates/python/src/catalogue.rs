@@ -33,7 +33,8 @@ use jobs::register::{RegisterConfig, RegisterModel, RegisterReport};
 use jobs::rpc::{RpcConvertConfig, RpcConvertReport, RpcInfoConfig, RpcInfoReport};
 use jobs::simulate::{SimulateConfig, SimulateJobError, SimulateReport};
 use jobs::splats::{
-    SplatConvertConfig, SplatConvertReport, SplatRenderConfig, SplatRenderReport, SplatsConfig, SplatsReport,
+    SplatConvertConfig, SplatConvertReport, SplatLabelConfig, SplatLabelReport, SplatRenderConfig, SplatRenderReport,
+    SplatsConfig, SplatsReport,
 };
 use jobs::split::{SplitJobConfig, SplitJobReport};
 use jobs::tiles::{TilesConfig, TilesReport};
@@ -323,6 +324,14 @@ pub(crate) const JOBS: [JobEntry; 36] = [
         jobs::splats::convert,
         ["splats", "output"],
         SplatConvertConfig::new(nowhere(), nowhere())
+    ),
+    job!(
+        "label_splats",
+        "Carry class and object of a city model onto splats.",
+        SplatLabelConfig => SplatLabelReport,
+        jobs::splats::label,
+        ["splats", "city", "output"],
+        SplatLabelConfig::new(nowhere(), nowhere(), nowhere())
     ),
     job!(
         "train",

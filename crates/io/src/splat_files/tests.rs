@@ -112,7 +112,8 @@ fn the_bytes_of_spz_are_those_of_its_description() {
         opacity: 0.6,
     };
     let layout = SplatLayout { form: SplatForm::Discs, sh_degree: 0 };
-    let bytes = spz::encode(&SplatFile { splats: vec![splat], harmonics: None, labels: None, layout, origin: None }).unwrap();
+    let bytes =
+        spz::encode(&SplatFile { splats: vec![splat], harmonics: None, labels: None, layout, origin: None }).unwrap();
     let mut body = Vec::new();
     std::io::Read::read_to_end(&mut flate2::read::GzDecoder::new(&bytes[..]), &mut body).unwrap();
     // 100 m leave 16 bits behind the point.

@@ -65,7 +65,8 @@ fn harmonics_come_back_padded_or_cut() {
         let layout = SplatLayout { form: SplatForm::Discs, sh_degree };
         // Files of other programs have no origin beside.
         let known = Some(harmonics.clone());
-        write_file(&path, &SplatFile { splats: splats(), harmonics: known, labels: None, layout, origin: None }, true).unwrap();
+        write_file(&path, &SplatFile { splats: splats(), harmonics: known, labels: None, layout, origin: None }, true)
+            .unwrap();
         let file = read(&path).unwrap();
         let found = file.harmonics.unwrap();
         assert_eq!((found.degree(), file.origin), (sh_degree, None));

@@ -46,7 +46,8 @@ pub fn write_file(path: &Path, file: &SplatFile, overwrite: bool) -> Result<(), 
     checked(path, splats, *layout, overwrite)?;
     if let Some(labels) = labels {
         if labels.of.len() != splats.len() {
-            let what = format!("there are {} labels, expected one for each of {} splats", labels.of.len(), splats.len());
+            let what =
+                format!("there are {} labels, expected one for each of {} splats", labels.of.len(), splats.len());
             return Err(invalid(path, what));
         }
         labels.table.write_beside(path, overwrite)?;

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use ::priors::{Sample, initial_splats};
+use gaussian::SplatLabel;
 use io::colmap::{self, ColmapEncoding, ColmapModel, ColmapObservation, ColmapPoint};
 use io::ply::{self, PlyPoint};
-use gaussian::SplatLabel;
 use io::splat_ply::{self, LocalOrigin, SplatFile, SplatForm, SplatLayout};
 
 use super::dataset::Dataset;

@@ -229,7 +229,9 @@ fn bring_to(
     match origin.vertical.parse::<VerticalDatum>() {
         Ok(VerticalDatum::Ellipsoid) => {
             if place.datum.is_none() {
-                progress.warn("the city model does not state the vertical datum of its heights, so they are taken as ellipsoidal");
+                progress.warn(
+                    "the city model does not state the vertical datum of its heights, so they are taken as ellipsoidal",
+                );
             }
             Ok(place.to_ellipsoid(mesh)?)
         }
