@@ -93,13 +93,13 @@ function pick({ eye, direction, pixel }) {
   }
   hits.sort((a, b) => a[0] - b[0]);
   let open = 1;
-  let half = null;
+  let middle = null;
   const parts = [];
   for (const [distance, alpha, splat] of hits) {
     if (open < 1e-4) break;
     parts.push([splat, open * alpha]);
     open *= 1 - alpha;
-    if (open < 0.5) half ??= distance;
+    if (open < 0.5) middle ??= distance;
   }
-  return half === null ? null : { distance: half, parts };
+  return middle === null ? null : { distance: middle, parts };
 }
