@@ -3,7 +3,8 @@
 
     benches/peers/labels_page.py [--skysweep PROGRAM] [--work FOLDER] [--chromium PROGRAM] [--clicks N]
 
-The splats of the sample town's true surface take class and object of its city model (`skysweep splats label`). The page
+The splats of the sample town's true surface take class and object of its city model (`skysweep splats label`), whose
+buildings get attributes of several types before. The page
 shows them from its first place. Clicks go to places on the screen that a lattice names; which object lies there follows
 from the table and the labels that the server sends, and from the place that the page reads out: the nearest labelled splat
 must be of the object that the page shows. Checked: no error on the console, no request to anywhere but the viewer, object,
@@ -31,7 +32,11 @@ def make_splats(skysweep, folder):
     quiet = ["--overwrite", "-q"]
     images = sorted(TOWN.glob("view_*.tif"))
     subprocess.run([skysweep, "splats", TOWN / "truth/dsm.tif", *images, "-o", bare, *quiet], check=True)
-    city = TOWN / "truth/buildings.city.json"
+    city = folder / "buildings.city.json"
+    model = json.loads((TOWN / "truth/buildings.city.json").read_text())
+    for number, one in enumerate(model["CityObjects"].values()):
+        one["attributes"] = {"storeys": number % 7 + 1, "use": f"<b>shop</b> & flat {number}", "listed": number % 2 == 0}
+    city.write_text(json.dumps(model))
     told = subprocess.run([skysweep, "splats", "label", bare, "--city", city, "-o", labelled, "--overwrite", "--json"],
                           check=True, capture_output=True, text=True)
     return labelled, json.loads(told.stdout)
@@ -70,22 +75,22 @@ def click(page, x, y):
     box = page.locator("#space").bounding_box()
     page.evaluate("delete document.getElementById('readout').dataset.place; document.getElementById('readout').textContent = ''")
     page.mouse.click(box["x"] + x * box["width"], box["y"] + y * box["height"])
-    page.wait_for_function("document.getElementById('readout').textContent !== ''", timeout=10000)
+    page.wait_for_selector("#readout:not(:empty)", timeout=30000)
     page.wait_for_timeout(100)
     found = page.locator("#readout").get_attribute("data-place")
     return json.loads(found) if found else None
 
 
-def use(page, url, arguments, checks):
+def use(page, url, folder, clicks, checks):
     import numpy as np
     places, objects, classes, table, scene = labels_of(page, url)
-    city = json.loads((TOWN / "truth/buildings.city.json").read_text())["CityObjects"]
+    city = json.loads((folder / "buildings.city.json").read_text())["CityObjects"]
     known = {one["number"]: one for one in table["objects"]}
     wanted = [one for one in table["objects"] if one["attributes"] == city[one["id"]].get("attributes", {})]
     checks.check(len(wanted) == len(known) > 0, f"{len(known)} objects have the attributes of the city model")
     before = picture(page)
     on_objects, right, attributes, first = 0, 0, 0, None
-    lattice = [(0.1 + 0.8 * ((i * 0.6180339887) % 1), 0.1 + 0.8 * (i + 0.5) / arguments.clicks) for i in range(arguments.clicks)]
+    lattice = [(0.1 + 0.8 * ((i * 0.6180339887) % 1), 0.1 + 0.8 * (i + 0.5) / clicks) for i in range(clicks)]
     for x, y in lattice:
         place = click(page, x, y)
         lines = shown(page)
@@ -103,7 +108,7 @@ def use(page, url, arguments, checks):
                        and all(lines[name] == (value if isinstance(value, str) else json.dumps(value, separators=(",", ":")))
                                for name, value in mine["attributes"].items()))
         first = first or (x, y)
-    checks.check(on_objects >= arguments.clicks // 10, f"{on_objects} of {arguments.clicks} clicks meet an object")
+    checks.check(on_objects >= clicks // 10, f"{on_objects} of {clicks} clicks meet an object")
     checks.check(right >= WANTED_SHARE * on_objects, f"{right} of {on_objects} show the object of the nearest labelled splat")
     checks.check(attributes == on_objects, f"{attributes} of {on_objects} show its kind, class, splats and attributes")
     if first is None:
@@ -155,7 +160,7 @@ def main():
             page.goto(url)
             page.wait_for_selector("html[data-ready]", timeout=60000)
             page.wait_for_selector("html[data-drawn=all]", timeout=60000)
-            use(page, url, arguments, checks)
+            use(page, url, arguments.work / "labels", arguments.clicks, checks)
             checks.check(not errors, "no error on the console" + "".join(errors[:2]))
             checks.check(all(one.startswith(url) or one.startswith(("data:", "blob:")) for one in asked), "nothing else is asked for")
             browser.close()
