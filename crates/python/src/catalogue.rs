@@ -107,7 +107,7 @@ fn town() -> SimulationConfig {
 }
 
 /// The jobs in the order of the documentation.
-pub(crate) const JOBS: [JobEntry; 36] = [
+pub(crate) const JOBS: [JobEntry; 37] = [
     job!(
         "dsm",
         "Make a surface model from satellite images with RPCs.",
@@ -536,7 +536,7 @@ fn named_scene(scene: &str) -> Result<SimulationConfig, Fault> {
 
 /// Returns the job called `name`.
 pub(crate) fn job(name: &str) -> Option<&'static JobEntry> {
-    static ALL: [JobEntry; 36] = JOBS;
+    static ALL: [JobEntry; 37] = JOBS;
     ALL.iter().find(|entry| entry.name == name)
 }
 

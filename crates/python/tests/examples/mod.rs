@@ -1,7 +1,7 @@
 //! An example of each job for its docstring in Python. A test holds their types (mypy).
 
 /// Names of the jobs, and lines of Python.
-pub(crate) const EXAMPLES: [(&str, &[&str]); 36] = [
+pub(crate) const EXAMPLES: [(&str, &[&str]); 37] = [
     (
         "dsm",
         &[
