@@ -9,6 +9,7 @@
 //! - [`Bvh::cast_image`] casts the rays of an image through one centre of projection.
 //! - [`Bvh::occluded`] tests which of many points are hidden from one centre of projection.
 //! - [`Bvh::closest_hit`] and [`Bvh::any_hit`] cast single rays of any origin.
+//! - [`Bvh::nearest`] finds the point of the triangles that is nearest to a position.
 //!
 //! ```
 //! use bvh::{Bvh, Ray};
@@ -23,6 +24,7 @@
 
 mod build;
 mod eye;
+mod nearest;
 mod node;
 mod ray;
 mod setup;
@@ -33,6 +35,7 @@ mod tree;
 mod view;
 
 pub use eye::{Eye, Target};
+pub use nearest::NearestPoint;
 pub use ray::{Hit, MISS, Ray};
 pub use tree::{Bvh, BvhError};
 pub use view::DepthImage;

@@ -249,3 +249,57 @@ fn of_equal_triangles_the_first_is_hit() {
     let ray = Ray { origin: [0.1, 0.2, 0.0], direction: [0.01, 0.0, 1.0], end: f64::INFINITY };
     assert_eq!(bvh.closest_hit(&ray).map(|hit| hit.triangle), Some(0));
 }
+
+/// Distance of a position from a triangle: that from its plane where it lies over the inside, else
+/// from the nearest of its edges.
+fn distance(p: Vector, [a, b, c]: [Vector; 3]) -> f64 {
+    let normal = cross(sub(b, a), sub(c, a));
+    let over = |from: Vector, to: Vector| dot(cross(sub(to, from), sub(p, from)), normal) > 0.0;
+    if over(a, b) && over(b, c) && over(c, a) {
+        return dot(sub(p, a), normal).abs() / dot(normal, normal).sqrt();
+    }
+    let edge = |from: Vector, to: Vector| {
+        let side = sub(to, from);
+        let length = dot(side, side);
+        let t = if length > 0.0 { (dot(sub(p, from), side) / length).clamp(0.0, 1.0) } else { 0.0 };
+        let off = sub(p, [0, 1, 2].map(|i| from[i] + t * side[i]));
+        dot(off, off).sqrt()
+    };
+    edge(a, b).min(edge(b, c)).min(edge(c, a))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 300, ..ProptestConfig::default() })]
+
+    #[test]
+    fn the_nearest_point_is_that_of_brute_force(
+        triangles in scene(), positions in prop::collection::vec(prop::array::uniform3(-90.0f64..90.0), 1..20),
+        within in prop_oneof![Just(f64::INFINITY), 0.0f64..60.0],
+    ) {
+        let bvh = built(&triangles);
+        for position in positions {
+            let expected = triangles.iter().map(|&t| distance(position, t)).fold(f64::INFINITY, f64::min);
+            let found = bvh.nearest(position, within);
+            if (expected - within).abs() > 1e-9 {
+                prop_assert_eq!(found.is_some(), expected < within);
+            }
+            let Some(found) = found else { continue };
+            let off = sub(position, found.point);
+            prop_assert!((found.distance_m - expected).abs() < 1e-9, "{} {}", found.distance_m, expected);
+            prop_assert!((dot(off, off).sqrt() - found.distance_m).abs() < 1e-12);
+            let own = distance(position, triangles[found.triangle as usize]);
+            prop_assert!((own - expected).abs() < 1e-9, "another triangle is nearer");
+        }
+    }
+}
+
+#[test]
+fn what_is_nowhere_has_no_nearest_point() {
+    let tree = built(&[[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], [[3.0; 3]; 3]]);
+    assert_eq!(tree.nearest([3.0; 3], f64::INFINITY).map(|found| found.triangle), Some(0));
+    assert!(tree.nearest([f64::NAN, 0.0, 0.0], 1.0).is_none() && tree.nearest([0.0; 3], -1.0).is_none());
+    assert!(built(&[]).nearest([0.0; 3], f64::INFINITY).is_none());
+    // Of a repeated triangle the first is found.
+    let twice = built(&[[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]; 9]);
+    assert_eq!(twice.nearest([0.2, 0.2, 4.0], 5.0).map(|found| (found.triangle, found.distance_m)), Some((0, 4.0)));
+}

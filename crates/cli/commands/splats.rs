@@ -1,12 +1,13 @@
 //! `skysweep splats`: Gaussian splats of a surface model and its images, as the PLY that 3DGS
 //! viewers and trainers read. `skysweep splats render` looks at them again, through images and
-//! perspective cameras, and `skysweep splats convert` brings them to other formats.
+//! perspective cameras, `skysweep splats convert` brings them to other formats, and `skysweep splats
+//! label` carries class and object of a city model onto them.
 
 use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use crs::VerticalDatum;
-use jobs::splats::{SplatConvertConfig, SplatRenderConfig, SplatsConfig, SplatsJobError};
+use jobs::splats::{SplatConvertConfig, SplatLabelConfig, SplatRenderConfig, SplatsConfig, SplatsJobError};
 use splats::DivisionConfig;
 
 use crate::corrections::corrections_of;
@@ -36,6 +37,8 @@ enum Command {
     Render(RenderArgs),
     /// Bring splats to another format: PLY of 3DGS or 2DGS, SPZ, SOG, binary glTF.
     Convert(ConvertArgs),
+    /// Carry class and object of a city model onto splats.
+    Label(LabelArgs),
 }
 
 /// Inputs and options of new splats.
@@ -152,11 +155,47 @@ struct ConvertArgs {
     run: RunOptions,
 }
 
+/// Arguments of `skysweep splats label`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples: skysweep splats label splats.ply --city buildings.city.json -o labelled.ply; \
+                  skysweep splats label trained/splats.ply --city city.gml --transform camera_from_model.json -o labelled.ply")]
+struct LabelArgs {
+    /// Splats of any format, with their origin beside them where they lie on a map.
+    splats: PathBuf,
+    /// City model: CityJSON, CityGML, OBJ or PLY.
+    #[arg(long, value_name = "CITY")]
+    city: PathBuf,
+    /// File to write (.ply, which alone holds labels); its origin and the table of the objects go
+    /// beside it as OUT.origin.json and OUT.objects.json.
+    #[arg(short, long, value_name = "OUT.ply")]
+    output: PathBuf,
+    /// Greatest distance of a splat's mass from the surface that it takes, as the root of the mean
+    /// square, metres.
+    #[arg(long, value_name = "METRES", default_value_t = label_defaults().tolerance_m)]
+    tolerance: f64,
+    /// Similarity from the city model to the frame of the splats (JSON), where they do not lie on
+    /// one map.
+    #[arg(long, value_name = "FILE")]
+    transform: Option<PathBuf>,
+    /// Vertical datum of the city model, where its file does not state it: ellipsoid, egm96,
+    /// egm2008 or an EPSG code.
+    #[arg(long, value_name = "DATUM")]
+    model_vertical: Option<VerticalDatum>,
+    #[command(flatten)]
+    run: RunOptions,
+}
+
+/// Returns labels under the default settings.
+fn label_defaults() -> SplatLabelConfig {
+    SplatLabelConfig::new(PathBuf::new(), PathBuf::new(), PathBuf::new())
+}
+
 /// Runs `skysweep splats`.
 pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
     match (&args.command, &args.make.dsm, &args.make.output) {
         (Some(Command::Render(args)), ..) => render(args, global),
         (Some(Command::Convert(args)), ..) => convert(args, global),
+        (Some(Command::Label(args)), ..) => label(args, global),
         (None, Some(dsm), Some(output)) => make(&args.make, dsm, output, global),
         _ => bail!("expected DSM, IMAGE and -o OUT.ply"),
     }
@@ -211,9 +250,23 @@ fn convert(args: &ConvertArgs, global: Global) -> anyhow::Result<Outcome> {
     Ok(Outcome::Complete)
 }
 
+fn label(args: &LabelArgs, global: Global) -> anyhow::Result<Outcome> {
+    let mut config = SplatLabelConfig::new(args.splats.clone(), args.city.clone(), args.output.clone());
+    config.tolerance_m = args.tolerance;
+    config.transform.clone_from(&args.transform);
+    config.vertical = args.model_vertical;
+    config.threads = args.run.threads;
+    config.overwrite = args.run.overwrite;
+    let show = args.run.show;
+    let report = show.watch(global, &args.output, |watcher| jobs::splats::label(&config, watcher)).map_err(hinted)?;
+    show.print(global, &report, || report.text(&args.output))?;
+    Ok(Outcome::Complete)
+}
+
 fn hinted(error: SplatsJobError) -> anyhow::Error {
     let hint = match &error {
         SplatsJobError::NoCamera => Some("give IMAGE or --cameras FOLDER"),
+        SplatsJobError::NotPlaced { .. } => Some("give --transform FILE"),
         _ => None,
     };
     with_hint(error, hint)

@@ -5,8 +5,10 @@
 //! `io` converts to the logarithms, logits and harmonics that trainers store.
 
 mod harmonics;
+mod labels;
 
 pub use harmonics::{SplatHarmonics, harmonic_slopes, harmonic_values};
+pub use labels::{LabelVotes, SplatLabel};
 
 /// An oriented Gaussian with a colour and an opacity.
 #[derive(Debug, Clone, Copy, PartialEq)]

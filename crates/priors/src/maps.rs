@@ -7,6 +7,7 @@
 //! face the camera.
 
 use bvh::{DepthImage, MISS};
+use gaussian::SplatLabel;
 use raster::Grid;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -57,9 +58,9 @@ pub struct MapConfig {
 }
 
 /// Class of a pixel that sees no building.
-pub const MISSING_CLASS: u8 = 255;
+pub const MISSING_CLASS: u8 = SplatLabel::NONE.class;
 /// Object of a pixel that sees no building; objects are numbered from 1.
-pub const NO_OBJECT: u32 = 0;
+pub const NO_OBJECT: u32 = SplatLabel::NONE.object;
 
 /// Maps of a view. All have the size of its image.
 #[derive(Debug, Clone, PartialEq)]

@@ -33,7 +33,8 @@ use jobs::register::{RegisterConfig, RegisterModel, RegisterReport};
 use jobs::rpc::{RpcConvertConfig, RpcConvertReport, RpcInfoConfig, RpcInfoReport};
 use jobs::simulate::{SimulateConfig, SimulateJobError, SimulateReport};
 use jobs::splats::{
-    SplatConvertConfig, SplatConvertReport, SplatRenderConfig, SplatRenderReport, SplatsConfig, SplatsReport,
+    SplatConvertConfig, SplatConvertReport, SplatLabelConfig, SplatLabelReport, SplatRenderConfig, SplatRenderReport,
+    SplatsConfig, SplatsReport,
 };
 use jobs::split::{SplitJobConfig, SplitJobReport};
 use jobs::tiles::{TilesConfig, TilesReport};
@@ -106,7 +107,7 @@ fn town() -> SimulationConfig {
 }
 
 /// The jobs in the order of the documentation.
-pub(crate) const JOBS: [JobEntry; 36] = [
+pub(crate) const JOBS: [JobEntry; 37] = [
     job!(
         "dsm",
         "Make a surface model from satellite images with RPCs.",
@@ -325,6 +326,14 @@ pub(crate) const JOBS: [JobEntry; 36] = [
         SplatConvertConfig::new(nowhere(), nowhere())
     ),
     job!(
+        "label_splats",
+        "Carry class and object of a city model onto splats.",
+        SplatLabelConfig => SplatLabelReport,
+        jobs::splats::label,
+        ["splats", "city", "output"],
+        SplatLabelConfig::new(nowhere(), nowhere(), nowhere())
+    ),
+    job!(
         "train",
         "Train flat Gaussian splats on the images of a dataset, with building priors.",
         TrainConfig => TrainReport,
@@ -527,7 +536,7 @@ fn named_scene(scene: &str) -> Result<SimulationConfig, Fault> {
 
 /// Returns the job called `name`.
 pub(crate) fn job(name: &str) -> Option<&'static JobEntry> {
-    static ALL: [JobEntry; 36] = JOBS;
+    static ALL: [JobEntry; 37] = JOBS;
     ALL.iter().find(|entry| entry.name == name)
 }
 

@@ -70,6 +70,7 @@ def test_reports_are_what_their_classes_declare(run: Path, tmp_path: Path) -> No
         skysweep.priors(model, [TOWN / "cameras"], tmp_path / "priors"),
         skysweep.splats(run, VIEWS, tmp_path / "splats.ply"),
         skysweep.convert_splats(tmp_path / "splats.ply", tmp_path / "packed.spz"),
+        skysweep.label_splats(tmp_path / "splats.ply", model, tmp_path / "labelled.ply"),
         skysweep.city_info(model),
         skysweep.city_convert(model, tmp_path / "town.ply"),
         skysweep.rpc_info(VIEWS[0]),

@@ -64,6 +64,7 @@ def every_job() -> list[float | int | str | None]:
     splats = skysweep.splats("run", views, "splats.ply")
     rendered = skysweep.render_splats("splats.ply", "views")
     converted = skysweep.convert_splats("splats.ply", "splats.spz")
+    labelled = skysweep.label_splats("splats.ply", "town.city.json", "labelled.ply")
     trained = skysweep.train("priors", "trained")
     mesh = skysweep.mesh("priors", {"maps": "priors/raw_depth"}, "town.ply")
     aligned = skysweep.align("sparse/0", "positions.csv", "aligned")
@@ -74,8 +75,8 @@ def every_job() -> list[float | int | str | None]:
     written = skysweep.rpc_convert("a.tif", "a.rpb")
     scene = skysweep.simulate("town", "scene")
     reported: list[skysweep.Report] = [terrain, classes, index, change, products, ortho, registered, surfaces, maps]
-    reported += [heights, points, tiles, ground, both, priors, splats, rendered, converted, trained, mesh, aligned]
-    reported += [split, city, triangles, rpc, written, scene, *faults]
+    reported += [heights, points, tiles, ground, both, priors, splats, rendered, converted, labelled, trained, mesh]
+    reported += [aligned, split, city, triangles, rpc, written, scene, *faults]
     skysweep.allow_remote()
     skysweep.fetch_grids()
     return [first, kept[0], residual, plan.id, chunk, wanted, state, left_out, mae, rest, kind, len(reported), str(void)]

@@ -13,6 +13,7 @@
 //!   the upper and the lower surface, with the colours of the oblique images that see them.
 //! - [`render`] composites splats front to back through any [`SplatCamera`]: RPC, perspective, or
 //!   straight from above. Splats of one surface are mixed, whichever of them is in front.
+//!   [`render_labels`] makes the map of the labels that splats have.
 //! - [`fit_colours`] finds the colours that render back to the images, robustly and over all views
 //!   that see a splat.
 //! - [`make_splats`] does all of this and measures the result. [`picture_splats`] does it for a
@@ -48,7 +49,7 @@ pub use gaussian::{GaussianConfig, splat_of_block};
 pub use multi_scale::ms_ssim;
 pub use picture::{picture_splats, stretched};
 pub use quality::{HeightErrors, height_errors, psnr_db, ssim};
-pub use render::{Rendering, render};
+pub use render::{Rendering, render, render_labels};
 pub use scene::{CurvePoint, SplatConfig, SplatError, SplatReport, SplatScene, SplatView, ViewReport, make_splats};
 pub use sight::{visible_cells, visible_pixels};
 pub use surface::SplatSurface;

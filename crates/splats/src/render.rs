@@ -5,7 +5,7 @@
 //! 2DGS).
 
 use crs::CrsError;
-use gaussian::Splat;
+use gaussian::{LabelVotes, Splat, SplatLabel};
 use raster::Grid;
 
 use super::SplatCamera;
@@ -33,6 +33,38 @@ pub struct Rendering {
 /// [`CrsError`] when PROJ cannot be set up.
 pub fn render(splats: &[Splat], camera: &impl SplatCamera) -> Result<Rendering, CrsError> {
     Ok(render_arranged(splats, &Arrangement::new(splats, camera)?))
+}
+
+/// Returns the label of each pixel, given those of the splats: that with the greatest weight in the
+/// rendering, as [`LabelVotes`] counts.
+///
+/// # Errors
+/// [`CrsError`] when PROJ cannot be set up.
+///
+/// # Panics
+/// If there are fewer labels than splats.
+pub fn render_labels(
+    splats: &[Splat],
+    labels: &[SplatLabel],
+    camera: &impl SplatCamera,
+) -> Result<Grid<SplatLabel>, CrsError> {
+    let arrangement = Arrangement::new(splats, camera)?;
+    let (width, height) = arrangement.size();
+    let tiles = arrangement.map_tiles(|tile| label_tile(labels, tile));
+    let mut map = Grid::filled(width, height, SplatLabel::NONE);
+    tiles.into_iter().flatten().for_each(|(column, row, label)| map[(column, row)] = label);
+    Ok(map)
+}
+
+fn label_tile(labels: &[SplatLabel], tile: &Tile<'_>) -> Vec<(usize, usize, SplatLabel)> {
+    let labels: Vec<SplatLabel> = tile.splats().map(|index| labels[index as usize]).collect();
+    let mut votes = vec![LabelVotes::default(); TILE_PIXELS];
+    let mut parts = Vec::new();
+    tile.parts(&mut parts);
+    for part in &parts {
+        votes[part.pixel as usize].add(labels[part.slot as usize], part.weight);
+    }
+    tile.pixels().map(|(index, column, row)| (column, row, votes[index].take())).collect()
 }
 
 pub(super) fn render_arranged(splats: &[Splat], arrangement: &Arrangement) -> Rendering {
@@ -146,6 +178,33 @@ mod tests {
         let image = render(&splats, &camera).unwrap();
         assert!(image.colour[(31, 23)][2] > 0.8 && image.colour[(31, 23)][1] == 0.0);
         assert!(image.colour[(45, 23)][0] > 0.4 && image.colour[(45, 23)][2] < 0.01);
+    }
+
+    /// The sums of the weights of two labels are what two colours show.
+    #[test]
+    fn labels_have_the_weights_of_the_rendering() {
+        let lens = Lens::new(64, 48, LensModel::Pinhole, &[50.0, 50.0, 31.5, 23.5]).unwrap();
+        let pose = Pose { rotation: [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]], centre: [0.0, 0.0, 30.0] };
+        let camera = LensSplatCamera { lens: &lens, pose: &pose };
+        let known = [SplatLabel { class: 2, object: 1 }, SplatLabel { class: 3, object: 1 }, SplatLabel::NONE];
+        let random = |i: usize, k: usize| ((i * 7919 + k * 104_729) % 997) as f32 / 997.0;
+        let splat = |i: usize| {
+            let position = [30.0 * random(i, 1) - 15.0, 20.0 * random(i, 2) - 10.0, 4.0 * random(i, 3)];
+            let colour = [0, 1, 2].map(|kind| if kind == i % 3 { 1.0 } else { 0.0 });
+            disc(position, 0.5 + random(i, 4), colour, 0.5)
+        };
+        let splats: Vec<Splat> = (0..220).map(splat).collect();
+        let labels: Vec<SplatLabel> = (0..220).map(|i| known[i % 3]).collect();
+        let (image, map) = (render(&splats, &camera).unwrap(), render_labels(&splats, &labels, &camera).unwrap());
+        let mut counts = [0; 4];
+        for (found, (sums, coverage)) in map.data().iter().zip(image.colour.data().iter().zip(image.coverage.data())) {
+            let best = (0..3).fold(0, |best, i| if sums[i] > sums[best] { i } else { best });
+            let is_close = (0..3).any(|i| i != best && sums[best] - sums[i] < 1e-5) || (coverage - 0.5).abs() < 1e-5;
+            let expected = if *coverage > 0.5 { known[best] } else { SplatLabel::NONE };
+            assert!(*found == expected || is_close, "{found:?} {sums:?} {coverage}");
+            counts[if *coverage > 0.5 { best } else { 3 }] += 1;
+        }
+        assert!(counts.iter().all(|count| *count > 100), "{counts:?}");
     }
 
     #[test]

@@ -141,6 +141,51 @@ pub(crate) fn draw<I: InstructionSet, const PERSPECTIVE: bool, const INVERSE: bo
     out.pixels[first..count].iter().map(|pixels| u64::from(pixels.count_ones())).sum()
 }
 
+/// Draws the splats of a tile without their depths, and calls `take` with the place of each entry
+/// among them, the block, and its transmittances before and after. The weight of the entry in a
+/// pixel is what it takes of its transmittance.
+#[inline(always)]
+pub(crate) fn weigh<I: InstructionSet, const PERSPECTIVE: bool>(
+    isa: I,
+    task: &TileTask<'_>,
+    sums: &mut TileSums,
+    mut take: impl FnMut(usize, usize, &Block, &Block),
+) {
+    task.clear(sums);
+    let mut open = (1u32 << BLOCKS) - 1;
+    for (number, &entry) in task.entries.iter().enumerate() {
+        let splat = &task.splats[entry as usize];
+        let mut left = blocks_within(splat, task.origin) & open;
+        if left == 0 {
+            continue;
+        }
+        let brush = Brush::new(isa, splat, task.origin, task.reference_depth);
+        while left != 0 {
+            let block = left.trailing_zeros() as usize % BLOCKS;
+            left &= left - 1;
+            let sums = &mut sums[block];
+            let before = sums.transmittance;
+            let (mut drawn, mut alive) = (0, false);
+            for part in 0..I::PARTS {
+                let (pixels, is_alive) = if splat.is_wide {
+                    draw_block::<I, PERSPECTIVE, false, true>(isa, &brush, splat, block, part, sums)
+                } else {
+                    draw_block::<I, PERSPECTIVE, false, false>(isa, &brush, splat, block, part, sums)
+                };
+                drawn |= pixels;
+                alive |= is_alive;
+            }
+            if drawn != 0 {
+                take(number, block, &before, &sums.transmittance);
+            }
+            open &= !(u32::from(!alive) << block);
+        }
+        if open == 0 {
+            break;
+        }
+    }
+}
+
 /// Draws a splat on a part of a block. Returns at which pixels, and whether any pixel takes more
 /// splats.
 #[inline(always)]

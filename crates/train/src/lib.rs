@@ -4,7 +4,7 @@
 //!   Geometrically Accurate Radiance Fields", SIGGRAPH 2024).
 //! * [`SurfelCamera`]: pinhole cameras and satellite images.
 //! * [`Drawing`]: images of colour, coverage, depth, normal and distortion, and the gradient of a
-//!   loss by all parameters.
+//!   loss by all parameters. [`Drawing::labels`] is the map of the labels that surfels have.
 //! * [`Trainer`]: surfels learn from views, with the depths and normals of a prior model where
 //!   there is one (GS4Buildings), within a budget of surfels.
 
@@ -18,6 +18,7 @@ mod footprint;
 mod forward;
 mod harmonics;
 mod image;
+mod labels;
 mod lattice;
 mod loss;
 mod normals;

@@ -3,11 +3,13 @@
 //! Each entry of a tile gets its own gradient, and those of a surfel are added in the order of its
 //! tiles, so that the number of threads changes nothing.
 
+use gaussian::SplatLabel;
 use rayon::prelude::*;
 
 use crate::arrange::Arrangement;
 use crate::bands::{Painted, Rays};
 use crate::image::{DepthSpread, SurfelImages};
+use crate::labels::label_map;
 use crate::screen::{ScreenGradient, gradient};
 use crate::simd::{Registers, prefetch};
 use crate::surfel::Surfel;
@@ -28,6 +30,7 @@ pub struct Drawing {
     pairs: u64,
     registers: Registers,
     spread: DepthSpread,
+    is_perspective: bool,
 }
 
 /// The gradient of a loss by the parameters of surfels.
@@ -84,6 +87,7 @@ impl Drawing {
     pub fn redraw<C: SurfelCamera>(&mut self, surfels: &[Surfel], camera: &C) {
         let size = camera.size();
         assert!(size.iter().all(|&s| s <= MAX_SIDE), "an image of {size:?} pixels is too large");
+        self.is_perspective = C::PERSPECTIVE;
         self.arrangement.arrange(surfels, camera);
         self.pairs = self.painted.paint(&self.arrangement, Rays::new(C::PERSPECTIVE, self.spread), self.registers);
     }
@@ -101,6 +105,16 @@ impl Drawing {
     /// Returns the number of pairs of a splat and a pixel that it is drawn at.
     pub fn pairs(&self) -> u64 {
         self.pairs
+    }
+
+    /// Returns the label of each pixel, by rows, given those of the surfels: that with the greatest
+    /// weight in the drawing, as [`gaussian::LabelVotes`] counts.
+    ///
+    /// # Panics
+    /// If the labels are not those of the surfels of the drawing.
+    pub fn labels(&self, labels: &[SplatLabel]) -> Vec<SplatLabel> {
+        assert_eq!(labels.len(), self.arrangement.splats.len(), "other surfels were drawn");
+        label_map(&self.arrangement, labels, self.is_perspective, self.registers)
     }
 
     /// Computes the gradient by the surfels, given that by the images.

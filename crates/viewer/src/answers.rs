@@ -5,6 +5,7 @@
 //! | `scene.json` | rasters, layers, legends |
 //! | `space.json` | splats, meshes, cameras |
 //! | `splats/NUMBER.bin`, `harmonics/NUMBER.bin` | splats as [`super::packed`] packs them |
+//! | `labels/NUMBER.bin`, `objects/NUMBER.json` | labels of splats as [`super::packed`] packs them, and the table of their objects |
 //! | `meshes/NUMBER.glb` | a mesh as it is |
 //! | `tile/LAYER/LEVEL/X/Y.png` | tile of a layer; a pixel of a level has 2^level cells |
 //! | `picture/LAYER.png?c&r&w&h&side` | window of a layer, at most `side` pixels wide and high |
@@ -92,7 +93,9 @@ impl<'a> Answers<'a> {
         match parts.as_slice() {
             ["scene.json"] => json(self.scene),
             ["space.json"] => json(self.space),
-            [kind @ ("splats" | "harmonics" | "meshes"), name] => self.space.bytes(kind, name).ok_or(Refusal::NotFound),
+            [kind @ ("splats" | "harmonics" | "labels" | "objects" | "meshes"), name] => {
+                self.space.bytes(kind, name).ok_or(Refusal::NotFound)
+            }
             ["tile", layer, level, x, y] => self.tile(layer, level, x, y),
             ["picture", layer] => self.picture(layer, &query),
             ["grid", raster] => self.grid(raster, &query),

@@ -5,7 +5,7 @@ use hyper::body::Bytes;
 use super::http::Answer;
 
 /// Files of the page by their names in the address: name, type, content.
-const FILES: [(&str, &str, &str); 23] = [
+const FILES: [(&str, &str, &str); 24] = [
     ("", HTML, include_str!("page/index.html")),
     ("style.css", "text/css; charset=utf-8", include_str!("page/style.css")),
     ("main.js", SCRIPT, include_str!("page/main.js")),
@@ -20,6 +20,7 @@ const FILES: [(&str, &str, &str); 23] = [
     ("space/main.js", SCRIPT, include_str!("page/space/main.js")),
     ("space/camera.js", SCRIPT, include_str!("page/space/camera.js")),
     ("space/splats.js", SCRIPT, include_str!("page/space/splats.js")),
+    ("space/objects.js", SCRIPT, include_str!("page/space/objects.js")),
     ("space/sort.js", SCRIPT, include_str!("page/space/sort.js")),
     ("space/mesh.js", SCRIPT, include_str!("page/space/mesh.js")),
     (ALIGN, HTML, include_str!("page/align/index.html")),

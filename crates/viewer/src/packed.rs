@@ -8,6 +8,9 @@
 //!
 //! The harmonics of a splat are halves: red, green and blue of each coefficient in turn, with zeros
 //! up to whole texels of 16 bytes.
+//!
+//! Labels are the numbers of the objects of all splats (u32), and after them those of their classes
+//! (u8).
 
 use io::splat_ply::SplatFile;
 
@@ -39,6 +42,13 @@ pub(super) fn harmonics(file: &SplatFile) -> Vec<u8> {
         out.resize(out.len().next_multiple_of(TEXEL), 0);
     }
     out
+}
+
+/// Returns the labels of a file; nothing where it has none.
+pub(super) fn labels(file: &SplatFile) -> Vec<u8> {
+    let Some(labels) = &file.labels else { return Vec::new() };
+    let objects = labels.of.iter().flat_map(|label| label.object.to_le_bytes());
+    objects.chain(labels.of.iter().map(|label| label.class)).collect()
 }
 
 /// Returns the nearest half. Values below 2⁻¹⁴ become 0, those above 65,504 become that.

@@ -65,10 +65,18 @@ struct SpaceSplats {
     degree: u8,
     /// Origin of the file, counted from that of the scene.
     shift: [f64; 3],
+    /// Whether they have classes and objects of a city model.
+    labelled: bool,
     #[serde(skip)]
     words: Bytes,
     #[serde(skip)]
     harmonics: Bytes,
+    /// Objects and classes, as [`packed::labels`] packs them; nothing where there are none.
+    #[serde(skip)]
+    labels: Bytes,
+    /// The table of the objects as JSON.
+    #[serde(skip)]
+    objects: Bytes,
 }
 
 #[derive(Debug, Clone, Serialize)]
@@ -165,6 +173,11 @@ impl Space {
         let body = match kind {
             "splats" => &self.splats.get(number(".bin")?)?.words,
             "harmonics" => &self.splats.get(number(".bin")?)?.harmonics,
+            "labels" => &self.splats.get(number(".bin")?).filter(|layer| layer.labelled)?.labels,
+            "objects" => {
+                let layer = self.splats.get(number(".json")?).filter(|layer| layer.labelled)?;
+                return Some(Answer { kind: "application/json", body: layer.objects.clone() });
+            }
             _ => &self.meshes.get(number(".glb")?)?.bytes,
         };
         Some(Answer { kind: BINARY, body: body.clone() })
@@ -193,9 +206,11 @@ impl Space {
             return Err(too_large("splats", found as u64, SPLATS_MAX as u64));
         }
         let Some(shift) = self.place(file.origin.as_ref(), path, progress) else { return Ok(()) };
-        let (words, harmonics) = (packed::splats(&file), packed::harmonics(&file));
-        let bytes: usize = self.splats.iter().map(|layer| layer.words.len() + layer.harmonics.len()).sum();
-        let bytes = bytes + words.len() + harmonics.len();
+        let (words, harmonics, labels) = (packed::splats(&file), packed::harmonics(&file), packed::labels(&file));
+        let table = file.labels.as_ref().map(|labels| serde_json::to_vec(&labels.table).unwrap_or_default());
+        let size = |layer: &SpaceSplats| layer.words.len() + layer.harmonics.len() + layer.labels.len();
+        let bytes: usize = self.splats.iter().map(size).sum();
+        let bytes = bytes + words.len() + harmonics.len() + labels.len();
         if bytes > SPLAT_BYTES_MAX {
             return Err(too_large("bytes of splats and harmonics", bytes as u64, SPLAT_BYTES_MAX as u64));
         }
@@ -205,8 +220,11 @@ impl Space {
             discs: file.is_flat() || file.layout.form == SplatForm::Discs,
             degree: file.harmonics.as_ref().map_or(0, |harmonics| harmonics.degree()),
             shift,
+            labelled: table.is_some(),
             words: words.into(),
             harmonics: harmonics.into(),
+            labels: labels.into(),
+            objects: table.unwrap_or_default().into(),
         });
         Ok(())
     }

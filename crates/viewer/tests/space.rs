@@ -6,9 +6,9 @@ use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::path::{Path, PathBuf};
 
-use gaussian::{Splat, SplatHarmonics};
+use gaussian::{Splat, SplatHarmonics, SplatLabel};
 use io::colmap::{ColmapEncoding, ColmapModel, ColmapView};
-use io::splat_ply::{LocalOrigin, SplatFile, SplatForm, SplatLayout};
+use io::splat_ply::{LabelTable, LabelledObject, LocalOrigin, SplatFile, SplatForm, SplatLabels, SplatLayout};
 use numeric::{CancelFlag, Cancellable, Silent};
 use serde_json::Value;
 use viewer::{ViewConfig, ViewError, ViewServer};
@@ -54,7 +54,7 @@ fn splats(origin: Option<LocalOrigin>) -> SplatFile {
     };
     let splats = vec![splat; 3];
     let harmonics = SplatHarmonics::new(1, (0..27).map(|i| i as f32 / 8.0).collect());
-    SplatFile { splats, harmonics, layout: SplatLayout { form: SplatForm::Discs, sh_degree: 1 }, origin }
+    SplatFile { splats, harmonics, labels: None, layout: SplatLayout { form: SplatForm::Discs, sh_degree: 1 }, origin }
 }
 
 fn origin(x: f64) -> LocalOrigin {
@@ -121,6 +121,36 @@ fn a_training_is_shown_with_its_cameras() {
         for path in
             ["/splats/1.bin", "/splats/0", "/harmonics/9.bin", "/meshes/1.glb", "/meshes/..%2f.glb", "/splats/-1.bin"]
         {
+            assert_eq!(get(path).0, 404, "{path}");
+        }
+    });
+}
+
+/// Objects and classes of splats come with the table of the objects; others have none.
+#[test]
+fn labels_come_with_their_table() {
+    let folder = tempfile::tempdir().unwrap();
+    let [labelled, bare] = ["a.ply", "b.ply"].map(|name| folder.path().join(name));
+    let [roof, wall] = [(2, 300), (3, 7)].map(|(class, object)| SplatLabel { class, object });
+    let attributes = [("storeys".to_owned(), 3.into())].into_iter().collect();
+    let [id, kind, building] = ["part", "BuildingPart", "house"].map(str::to_owned);
+    let objects = vec![LabelledObject { number: 300, id, kind, building, attributes }];
+    let table = LabelTable { classes: [(2, "RoofSurface".to_owned())].into(), objects, ..LabelTable::default() };
+    let labels = Some(SplatLabels { of: vec![roof, wall, SplatLabel::NONE], table });
+    io::splat_files::write(&labelled, &SplatFile { labels, ..splats(None) }, false).unwrap();
+    io::splat_files::write(&bare, &splats(None), false).unwrap();
+    served(&[labelled, bare], |get| {
+        let scene: Value = serde_json::from_slice(&get("/space.json").1).unwrap();
+        let is_labelled = |i: usize| scene["splats"][i]["labelled"].as_bool();
+        assert_eq!((is_labelled(0), is_labelled(1)), (Some(true), Some(false)));
+        let (status, numbers) = get("/labels/0.bin");
+        assert_eq!((status, &numbers[..]), (200, &[44, 1, 0, 0, 7, 0, 0, 0, 0, 0, 0, 0, 2, 3, 255][..]));
+        let table: Value = serde_json::from_slice(&get("/objects/0.json").1).unwrap();
+        assert_eq!((&table["classes"]["2"], &table["missing_object"]), (&"RoofSurface".into(), &0.into()));
+        let object = &table["objects"][0];
+        assert_eq!((&object["id"], &object["attributes"]["storeys"]), (&"part".into(), &3.into()));
+        assert_eq!(get("/space/objects.js").0, 200);
+        for path in ["/labels/1.bin", "/objects/1.json", "/objects/0.bin", "/labels/2.bin"] {
             assert_eq!(get(path).0, 404, "{path}");
         }
     });

@@ -370,7 +370,7 @@ fn colours_that_a_format_cannot_hold_are_counted() {
     };
     let splats = vec![splat, gaussian::Splat { colour: [0.2, -0.6, 1.0], ..splat }];
     let layout = io::splat_ply::SplatLayout::default();
-    let file = io::splat_ply::SplatFile { splats, harmonics: None, layout, origin: None };
+    let file = io::splat_ply::SplatFile { splats, harmonics: None, labels: None, layout, origin: None };
     io::splat_files::write(&bright, &file, false).unwrap();
     let mut command = skysweep();
     command.args(["splats", "convert", "--json"]).arg(&bright).arg(&spz);

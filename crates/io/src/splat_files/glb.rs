@@ -131,6 +131,7 @@ pub(super) fn decode(bytes: &[u8]) -> Result<SplatFile, String> {
     Ok(SplatFile {
         splats: (0..count).map(splat).collect(),
         harmonics: SplatHarmonics::new(sh_degree, harmonics).filter(|_| !are_zero),
+        labels: None,
         layout: SplatLayout { form: SplatForm::Ellipsoids, sh_degree },
         origin: None,
     })

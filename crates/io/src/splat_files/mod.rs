@@ -63,6 +63,11 @@ impl SplatFormat {
         (self == Self::Spz).then(spz::colour_range)
     }
 
+    /// Returns whether the format holds classes and objects of splats.
+    pub fn holds_labels(self) -> bool {
+        self == Self::Ply
+    }
+
     /// Returns the format of a file by its first bytes.
     fn of_content(bytes: &[u8]) -> Option<Self> {
         let starts = [(&b"ply"[..], Self::Ply), (&spz::GZIP[..], Self::Spz), (&spz::MAGIC[..], Self::Spz)];
@@ -96,7 +101,7 @@ impl SplatFormat {
 ///     opacity: 0.75,
 /// };
 /// let layout = SplatLayout { form: SplatForm::Ellipsoids, sh_degree: 0 };
-/// let file = SplatFile { splats: vec![splat], harmonics: None, layout, origin: None };
+/// let file = SplatFile { splats: vec![splat], harmonics: None, labels: None, layout, origin: None };
 /// splat_files::write(&path, &file, false)?;
 ///
 /// let back = splat_files::read(&path)?;
@@ -121,7 +126,8 @@ pub fn read(path: &Path) -> Result<SplatFile, SplatPlyError> {
 }
 
 /// Writes splats in the format that the ending of the path names, and their origin beside them.
-/// Harmonics are padded with zeros or cut to the degree of the layout.
+/// Harmonics are padded with zeros or cut to the degree of the layout. Labels are left out where
+/// the format does not hold them ([`SplatFormat::holds_labels`]).
 ///
 /// # Errors
 /// - [`SplatPlyError::Invalid`] for another ending, a degree above 3, an origin that is not finite,

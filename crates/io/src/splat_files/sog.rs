@@ -309,7 +309,7 @@ pub(super) fn decode(bytes: &[u8]) -> Result<SplatFile, String> {
     };
     let form = if meta.model.as_deref() == Some(DISCS) { SplatForm::Discs } else { SplatForm::Ellipsoids };
     let layout = SplatLayout { form, sh_degree: harmonics.as_ref().map_or(0, SplatHarmonics::degree) };
-    Ok(SplatFile { splats: (0..count).map(splat).collect(), harmonics, layout, origin: None })
+    Ok(SplatFile { splats: (0..count).map(splat).collect(), harmonics, labels: None, layout, origin: None })
 }
 
 fn whole(name: &str, codebook: &[f32]) -> Result<(), String> {

@@ -257,6 +257,7 @@ fn splats(header: &Header, streams: [&[u8]; 6]) -> SplatFile {
     SplatFile {
         splats: (0..header.count).map(splat).collect(),
         harmonics: SplatHarmonics::new(header.sh_degree, coefficients).filter(|_| !are_zero),
+        labels: None,
         layout: header.layout(),
         origin: None,
     }

@@ -29,7 +29,7 @@ fn scene(count: usize, form: SplatForm, sh_degree: u8) -> SplatFile {
     let coefficients = (0..count * 3 * SplatHarmonics::count(3)).map(|_| unit(-0.3, 0.3)).collect();
     let harmonics = SplatHarmonics::new(3, coefficients).filter(|_| sh_degree > 0);
     let origin = Some(LocalOrigin::new("EPSG:32631", "ellipsoid", [690_000.0, 4_820_000.0, 180.0]));
-    SplatFile { splats, harmonics, layout: SplatLayout { form, sh_degree }, origin }
+    SplatFile { splats, harmonics, labels: None, layout: SplatLayout { form, sh_degree }, origin }
 }
 
 /// Greatest angle of the axes, and differences of positions, logarithms of the first two scales,
@@ -112,7 +112,8 @@ fn the_bytes_of_spz_are_those_of_its_description() {
         opacity: 0.6,
     };
     let layout = SplatLayout { form: SplatForm::Discs, sh_degree: 0 };
-    let bytes = spz::encode(&SplatFile { splats: vec![splat], harmonics: None, layout, origin: None }).unwrap();
+    let bytes =
+        spz::encode(&SplatFile { splats: vec![splat], harmonics: None, labels: None, layout, origin: None }).unwrap();
     let mut body = Vec::new();
     std::io::Read::read_to_end(&mut flate2::read::GzDecoder::new(&bytes[..]), &mut body).unwrap();
     // 100 m leave 16 bits behind the point.

@@ -1,8 +1,8 @@
 //! Gaussian splats as PLY files for viewers and trainers of 3D Gaussian Splatting (Kerbl et al.
 //! 2023) and 2DGS (Huang et al. 2024).
 //!
-//! The file is binary little-endian. It has one `vertex` per splat, and all its properties are
-//! `float`:
+//! The file is binary little-endian. It has one `vertex` per splat, and all its properties but the
+//! last two are `float`:
 //!
 //! - `x y z`: position, metres from a local origin
 //! - `nx ny nz`: surface normal
@@ -12,19 +12,24 @@
 //! - `opacity`: logit of the opacity
 //! - `scale_0..2`: natural logarithm of the standard deviations in metres; 2DGS has only two
 //! - `rot_0..3`: quaternion, w first
+//! - `class` (`uchar`) and `object` (`uint`): number of the class, and of the object of the city model
+//!   that the splat stands for; only where splats have labels
 //!
 //! The local origin is in a file of its own, `NAME.origin.json`, because not every loader skips PLY
-//! comments.
+//! comments. The table of classes and objects is `NAME.objects.json`. Loaders look properties up by
+//! name, so that those of labels do not disturb them.
 //!
 //! The number of splats is checked against the length of the file before anything is allocated.
 
 mod error;
+mod labels;
 mod layout;
 mod origin;
 mod read;
 mod write;
 
 pub use error::SplatPlyError;
+pub use labels::{LabelTable, LabelledObject, SplatLabels, objects_path};
 pub use layout::{SH_DEGREE_MAX, SplatForm, SplatLayout};
 pub use origin::{LocalOrigin, origin_path};
 pub use read::{SplatFile, read};

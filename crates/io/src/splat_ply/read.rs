@@ -4,9 +4,10 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use gaussian::{Splat, SplatHarmonics};
+use gaussian::{Splat, SplatHarmonics, SplatLabel};
 
 use super::error::{SplatPlyError, invalid};
+use super::labels::{LabelTable, SplatLabels};
 use super::layout::{SH_C0, SH_DEGREE_MAX, SplatForm, SplatLayout};
 use super::origin::LocalOrigin;
 use crate::regular::read_regular;
@@ -29,6 +30,8 @@ pub struct SplatFile {
     pub splats: Vec<Splat>,
     /// Harmonics beyond the constant one; `None` where the file has none that are not 0.
     pub harmonics: Option<SplatHarmonics>,
+    /// Classes and objects of the splats, where the file has them: only PLY can hold them.
+    pub labels: Option<SplatLabels>,
     /// Properties of the file.
     pub layout: SplatLayout,
     /// Origin of the positions, when a file with it lies beside.
@@ -64,6 +67,8 @@ struct Header {
     count: u64,
     /// The float properties by name.
     floats: HashMap<String, Column>,
+    /// Byte offsets of class and object in a row, where they have the types of labels.
+    labels: [Option<usize>; 2],
     /// Size of a row, bytes.
     row: usize,
     /// Byte offset of the first row.
@@ -122,10 +127,14 @@ pub fn read(path: &Path) -> Result<SplatFile, SplatPlyError> {
     let rows = bytes[header.body..].chunks_exact(header.row).take(header.count as usize);
     let mut splats = Vec::with_capacity(header.count as usize);
     let mut coefficients: Vec<f32> = Vec::new();
+    let mut labels: Option<Vec<SplatLabel>> = columns.labels.map(|_| Vec::with_capacity(header.count as usize));
     for (index, row) in rows.enumerate() {
         let splat = columns.splat(row);
         splat.validate().map_err(|defect| invalid(path, format!("splat {index}: {defect}")))?;
         splats.push(splat);
+        if let (Some(labels), Some(places)) = (&mut labels, columns.labels) {
+            labels.push(label(row, places));
+        }
         coefficients.extend(columns.rest.iter().map(|&column| value(row, column) as f32));
     }
     if let Some(place) = coefficients.iter().position(|c| !c.is_finite()) {
@@ -135,7 +144,9 @@ pub fn read(path: &Path) -> Result<SplatFile, SplatPlyError> {
     // Trainers without harmonics pad files with zeros for loaders.
     let are_zero = coefficients.iter().all(|c| *c == 0.0);
     let harmonics = SplatHarmonics::new(columns.layout.sh_degree, coefficients).filter(|_| !are_zero);
-    Ok(SplatFile { splats, harmonics, layout: columns.layout, origin: LocalOrigin::read_beside(path)? })
+    let table = || LabelTable::read_beside(path).map(Option::unwrap_or_default);
+    let labels = labels.map(|of| Ok::<_, SplatPlyError>(SplatLabels { of, table: table()? })).transpose()?;
+    Ok(SplatFile { splats, harmonics, labels, layout: columns.layout, origin: LocalOrigin::read_beside(path)? })
 }
 
 fn header(bytes: &[u8]) -> Result<Header, String> {
@@ -147,7 +158,8 @@ fn header(bytes: &[u8]) -> Result<Header, String> {
     if lines.next().map(str::trim) != Some("ply") {
         return Err("the file does not begin with \"ply\"".to_owned());
     }
-    let mut header = Header { count: 0, floats: HashMap::new(), row: 0, body: end + mark.len() };
+    let body = end + mark.len();
+    let mut header = Header { count: 0, floats: HashMap::new(), labels: [None; 2], row: 0, body };
     let (mut binary, mut element) = (false, None);
     for line in lines {
         let words: Vec<&str> = line.split_whitespace().collect();
@@ -188,6 +200,11 @@ impl Header {
         if matches!(kind, "float" | "float32" | "double" | "float64") {
             self.floats.insert(name.to_owned(), Column { at: self.row, size });
         }
+        match (kind, name) {
+            ("uchar" | "uint8", "class") => self.labels[0] = Some(self.row),
+            ("uint" | "uint32", "object") => self.labels[1] = Some(self.row),
+            _ => {}
+        }
         self.row += size;
         Ok(())
     }
@@ -202,6 +219,12 @@ fn value(row: &[u8], Column { at, size }: Column) -> f64 {
     }
 }
 
+/// Returns the label of a row, given the places of its class and object.
+fn label(row: &[u8], [class, object]: [usize; 2]) -> SplatLabel {
+    let [a, b, c, d] = [0, 1, 2, 3].map(|i| row[object + i]);
+    SplatLabel { class: row[class], object: u32::from_le_bytes([a, b, c, d]) }
+}
+
 /// Places of the numbers of a splat within a row.
 struct Columns {
     position: [Column; 3],
@@ -211,6 +234,8 @@ struct Columns {
     rotation: [Column; 4],
     /// The harmonics beyond the constant one.
     rest: Vec<Column>,
+    /// Byte offsets of class and object, where there are both.
+    labels: Option<[usize; 2]>,
     layout: SplatLayout,
 }
 
@@ -232,6 +257,7 @@ impl Columns {
         let rest = (0..rest).map(|i| numbered("f_rest", i)).collect::<Result<Vec<Column>, String>>()?;
         Ok(Self {
             rest,
+            labels: header.labels[0].zip(header.labels[1]).map(|(class, object)| [class, object]),
             position: [column("x")?, column("y")?, column("z")?],
             colour: [numbered("f_dc", 0)?, numbered("f_dc", 1)?, numbered("f_dc", 2)?],
             opacity: column("opacity")?,

@@ -1,6 +1,6 @@
 //! Round trips, the layout that loaders expect, and files that are not splats.
 
-use gaussian::Splat;
+use gaussian::{Splat, SplatLabel};
 
 use super::*;
 use crate::atomic::SaveError;
@@ -65,7 +65,8 @@ fn harmonics_come_back_padded_or_cut() {
         let layout = SplatLayout { form: SplatForm::Discs, sh_degree };
         // Files of other programs have no origin beside.
         let known = Some(harmonics.clone());
-        write_file(&path, &SplatFile { splats: splats(), harmonics: known, layout, origin: None }, true).unwrap();
+        write_file(&path, &SplatFile { splats: splats(), harmonics: known, labels: None, layout, origin: None }, true)
+            .unwrap();
         let file = read(&path).unwrap();
         let found = file.harmonics.unwrap();
         assert_eq!((found.degree(), file.origin), (sh_degree, None));
@@ -77,9 +78,42 @@ fn harmonics_come_back_padded_or_cut() {
     write(&path, &splats(), &origin(), layout, true).unwrap();
     assert_eq!(read(&path).unwrap().harmonics, None);
     let broken = gaussian::SplatHarmonics::new(1, vec![f32::NAN; 18]).unwrap();
-    let broken = SplatFile { splats: splats(), harmonics: Some(broken), layout, origin: Some(origin()) };
+    let broken = SplatFile { splats: splats(), harmonics: Some(broken), labels: None, layout, origin: Some(origin()) };
     write_file(&path, &broken, true).unwrap();
     assert!(read(&path).unwrap_err().to_string().contains("splat 0: a harmonic is not finite"));
+}
+
+/// Labels and their table come back, and loaders that know nothing of them read the rest.
+#[test]
+fn labels_come_back_with_their_table() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("s.ply");
+    let labels = [SplatLabel { class: 2, object: 70_000_001 }, SplatLabel::NONE];
+    let mut table = LabelTable::default();
+    table.classes.insert(2, "RoofSurface".to_owned());
+    let attributes = [("storeys".to_owned(), 3.into())].into_iter().collect();
+    let [id, kind, building] = ["part", "BuildingPart", "house"].map(str::to_owned);
+    table.objects.push(LabelledObject { number: 70_000_001, id, kind, building, attributes });
+    let labels = SplatLabels { of: labels.to_vec(), table };
+    let layout = SplatLayout { form: SplatForm::Discs, sh_degree: 1 };
+    let harmonics = gaussian::SplatHarmonics::new(1, (0..18).map(|i| i as f32 - 4.0).collect());
+    let file = SplatFile { splats: splats(), harmonics, labels: Some(labels), layout, origin: Some(origin()) };
+    write_file(&path, &file, false).unwrap();
+    let back = read(&path).unwrap();
+    assert_eq!((&back.labels, &back.harmonics, &back.origin), (&file.labels, &file.harmonics, &file.origin));
+    assert!(back.splats.iter().zip(&splats()).all(|(a, b)| close(a, b)), "{:?}", back.splats);
+    // The floats come first, where programs that count on their order find them.
+    let text = String::from_utf8_lossy(&std::fs::read(&path).unwrap()).into_owned();
+    assert!(text.contains("property float rot_3\nproperty uchar class\nproperty uint object\nend_header\n"));
+    // Without the table, the numbers are still there.
+    std::fs::remove_file(objects_path(&path)).unwrap();
+    let bare = read(&path).unwrap().labels.unwrap();
+    assert_eq!((bare.of, bare.table), (file.labels.clone().unwrap().of, LabelTable::default()));
+    std::fs::write(objects_path(&path), "[]").unwrap();
+    assert!(read(&path).unwrap_err().to_string().contains("objects.json"));
+    let few = SplatLabels { of: vec![SplatLabel::NONE], table: LabelTable::default() };
+    let error = write_file(&path, &SplatFile { labels: Some(few), ..file }, true).unwrap_err();
+    assert!(error.to_string().contains("there are 1 labels"));
 }
 
 /// Compares the first splat with what the loader of the original 3DGS code expects, computed by

@@ -3,7 +3,7 @@
 use std::io::Write;
 use std::path::Path;
 
-use gaussian::{Splat, SplatHarmonics};
+use gaussian::{Splat, SplatHarmonics, SplatLabel};
 
 use super::error::{SplatPlyError, invalid};
 use super::layout::{SH_C0, SH_DEGREE_MAX, SplatLayout};
@@ -29,24 +29,34 @@ pub fn write(
     checked(path, splats, layout, overwrite)?;
     // The splats are written last, so that a file of splats always has its origin.
     origin.write_beside(path, overwrite)?;
-    Ok(write_stream(path, overwrite, |out| body(out, splats, None, layout))?)
+    Ok(write_stream(path, overwrite, |out| body(out, splats, None, None, layout))?)
 }
 
 /// Writes splats as [`write()`] does, with their harmonics: padded with zeros or cut to the degree
-/// of the layout. An origin is written beside them where there is one.
+/// of the layout. An origin is written beside them where there is one. Splats with labels get two
+/// properties more, and the table beside them.
 ///
 /// # Errors
-/// Those of [`write()`].
+/// Those of [`write()`]; [`SplatPlyError::Invalid`] when the labels are not as many as the splats.
 ///
 /// # Panics
 /// If there are harmonics of fewer splats.
 pub fn write_file(path: &Path, file: &SplatFile, overwrite: bool) -> Result<(), SplatPlyError> {
-    let SplatFile { splats, harmonics, layout, origin } = file;
+    let SplatFile { splats, harmonics, labels, layout, origin } = file;
     checked(path, splats, *layout, overwrite)?;
+    if let Some(labels) = labels {
+        if labels.of.len() != splats.len() {
+            let what =
+                format!("there are {} labels, expected one for each of {} splats", labels.of.len(), splats.len());
+            return Err(invalid(path, what));
+        }
+        labels.table.write_beside(path, overwrite)?;
+    }
+    let labels = labels.as_ref().map(|labels| labels.of.as_slice());
     if let Some(origin) = origin {
         origin.write_beside(path, overwrite)?;
     }
-    Ok(write_stream(path, overwrite, |out| body(out, splats, harmonics.as_ref(), *layout))?)
+    Ok(write_stream(path, overwrite, |out| body(out, splats, harmonics.as_ref(), labels, *layout))?)
 }
 
 /// Checks what is to be written, before anything is.
@@ -70,11 +80,15 @@ fn body(
     out: &mut dyn Write,
     splats: &[Splat],
     harmonics: Option<&SplatHarmonics>,
+    labels: Option<&[SplatLabel]>,
     layout: SplatLayout,
 ) -> std::io::Result<()> {
     writeln!(out, "ply\nformat binary_little_endian 1.0\nelement vertex {}", splats.len())?;
     for name in layout.properties() {
         writeln!(out, "property float {name}")?;
+    }
+    if labels.is_some() {
+        writeln!(out, "property uchar class\nproperty uint object")?;
     }
     writeln!(out, "end_header")?;
     let mut row: Vec<u8> = Vec::new();
@@ -93,6 +107,10 @@ fn body(
         put((opacity / (1.0 - opacity)).ln());
         splat.scale_m[..layout.form.scales()].iter().for_each(|&s| put(f64::from(s).ln()));
         splat.rotation.iter().for_each(|&q| put(f64::from(q)));
+        if let Some(SplatLabel { class, object }) = labels.map(|labels| labels[number]) {
+            row.push(class);
+            row.extend_from_slice(&object.to_le_bytes());
+        }
         out.write_all(&row)?;
     }
     Ok(())

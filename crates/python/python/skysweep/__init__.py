@@ -22,8 +22,8 @@ Accuracy
     :func:`simulate` makes scenes whose exact surface is known.
 City models, splats, cameras
     :func:`priors` of a city model, :func:`city_info`, :func:`city_convert`; :func:`splats`,
-    :func:`render_splats`, :func:`convert_splats`, :func:`train`, :func:`mesh`; :func:`align` and
-    :func:`split` of COLMAP models; :func:`rpc_info`, :func:`rpc_convert`.
+    :func:`render_splats`, :func:`convert_splats`, :func:`label_splats`, :func:`train`,
+    :func:`mesh`; :func:`align` and :func:`split` of COLMAP models; :func:`rpc_info`, :func:`rpc_convert`.
 Objects on arrays
     :class:`Rpc` projects points and finds them (:class:`FittedRpc` is a fit), :class:`HeightSweep`
     finds the heights of arrays (:class:`ViewHeights`), :class:`CityModel` casts rays

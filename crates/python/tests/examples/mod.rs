@@ -1,7 +1,7 @@
 //! An example of each job for its docstring in Python. A test holds their types (mypy).
 
 /// Names of the jobs, and lines of Python.
-pub(crate) const EXAMPLES: [(&str, &[&str]); 36] = [
+pub(crate) const EXAMPLES: [(&str, &[&str]); 37] = [
     (
         "dsm",
         &[
@@ -71,6 +71,7 @@ pub(crate) const EXAMPLES: [(&str, &[&str]); 36] = [
     ("splats", &["report = skysweep.splats(\"run\", [\"left.tif\", \"right.tif\"], \"splats.ply\", walls=False)"]),
     ("render_splats", &["report = skysweep.render_splats(\"splats.ply\", \"views\", images=[\"left.tif\"])"]),
     ("convert_splats", &["report = skysweep.convert_splats(\"splats.ply\", \"splats.spz\", sh_degree=0)"]),
+    ("label_splats", &["report = skysweep.label_splats(\"splats.ply\", \"town.city.json\", \"labelled.ply\")"]),
     ("train", &["report = skysweep.train(\"priors\", \"trained\", iterations=3000, priors=\"both\")"]),
     ("mesh", &["report = skysweep.mesh(\"priors\", {\"maps\": \"priors/raw_depth\"}, \"town.ply\", voxel_m=0.5)"]),
     ("align", &["report = skysweep.align(\"sparse/0\", \"positions.csv\", \"aligned\", crs_epsg=32631)"]),

@@ -15,7 +15,7 @@ pub(super) const NOTE: &str = ".replaced-by-skysweep.json";
 /// What follows the name of a view in the names of its files.
 const PARTS: [&str; 6] = ["", "_depth", "_normal", "_class", "_object", "_height"];
 /// Files that belong to no view, each with its folder.
-const FIXED: [&str; 11] = [
+const FIXED: [&str; 13] = [
     "sparse/0/cameras.bin",
     "sparse/0/cameras.txt",
     "sparse/0/images.bin",
@@ -25,8 +25,10 @@ const FIXED: [&str; 11] = [
     "sparse/0/points3D.ply",
     "splats/splats_2dgs.ply",
     "splats/splats_2dgs.origin.json",
+    "splats/splats_2dgs.objects.json",
     "splats/splats_3dgs.ply",
     "splats/splats_3dgs.origin.json",
+    "splats/splats_3dgs.objects.json",
 ];
 /// Endings of the files of views, by their folder; pictures keep the ending that they had.
 const ENDINGS: [(&str, &str); 14] = [

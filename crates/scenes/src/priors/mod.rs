@@ -28,6 +28,8 @@ mod satellite;
 mod size;
 mod trainer;
 
+pub(crate) use labels::with_table;
+
 pub use config::{PriorsClassWeight, PriorsConfig, PriorsImages, PriorsMiss, PriorsMode, PriorsTrainer};
 pub use error::{LensFault, PriorsJobError};
 pub use outcome::{PriorsJobReport, PriorsProduct};

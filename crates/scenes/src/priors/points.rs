@@ -4,12 +4,13 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use ::priors::{Sample, initial_splats};
+use gaussian::SplatLabel;
 use io::colmap::{self, ColmapEncoding, ColmapModel, ColmapObservation, ColmapPoint};
 use io::ply::{self, PlyPoint};
-use io::splat_ply::{self, LocalOrigin, SplatForm, SplatLayout};
+use io::splat_ply::{self, LocalOrigin, SplatFile, SplatForm, SplatLayout};
 
 use super::dataset::Dataset;
-use super::labels::colour;
+use super::labels::{colour, with_table};
 use job::files::{self, FileError};
 
 /// Writes the kept points as a COLMAP model and as PLY, and with extras as text, as a second PLY
@@ -68,13 +69,17 @@ fn kept(dataset: &Dataset<'_>) -> Vec<Sample> {
 fn write_splats(dataset: &Dataset<'_>, folder: &Path, kept: &[Sample]) -> Result<(), FileError> {
     let colours = kept.iter().map(|s| (s, colour(s.class).map(|c| f32::from(c) / 255.0)));
     let splats = initial_splats(colours);
+    let label = |s: &Sample| SplatLabel { class: s.class as u8, object: s.object.saturating_add(1) };
+    let labels = with_table(kept.iter().map(label).collect(), &dataset.file.model);
     let path = folder.join("splats");
     files::create_folder(&path)?;
     let moved = dataset.frame.moved_by().unwrap_or_default();
     let origin = LocalOrigin::new("frame of the cameras, see origin.json", "frame of the cameras", moved);
     for (name, form) in [("splats_2dgs.ply", SplatForm::Discs), ("splats_3dgs.ply", SplatForm::Ellipsoids)] {
         let layout = SplatLayout { form, sh_degree: 3 };
-        splat_ply::write(&path.join(name), &splats, &origin, layout, false).map_err(FileError::write)?;
+        let (splats, labels, origin) = (splats.clone(), Some(labels.clone()), Some(origin.clone()));
+        let file = SplatFile { splats, harmonics: None, labels, layout, origin };
+        splat_ply::write_file(&path.join(name), &file, false).map_err(FileError::write)?;
     }
     Ok(())
 }

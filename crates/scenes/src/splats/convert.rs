@@ -47,6 +47,9 @@ pub struct SplatConvertReport {
     /// Splats with a colour that the format cannot hold, which was brought to the nearest that it
     /// can: SPZ has none below -0.44 and above 1.44.
     pub clipped: usize,
+    /// Splats with a class and an object of a city model, which the format cannot hold: only PLY
+    /// does.
+    pub labels_lost: usize,
     /// Size of the file read, bytes.
     pub bytes_before: u64,
     /// Size of the file written, bytes.
@@ -87,8 +90,12 @@ impl SplatConvertReport {
             0 => String::new(),
             count => format!("clipped    {count} splats have colours that the format cannot hold\n"),
         };
+        let lost = match self.labels_lost {
+            0 => String::new(),
+            count => format!("labels     class and object of {count} splats are left out: only PLY holds them\n"),
+        };
         format!(
-            "splats     {} {kind}, harmonics of degree {}\nsize       {:.1} MB, before {:.1} MB\n{clipped}written    {}\n",
+            "splats     {} {kind}, harmonics of degree {}\nsize       {:.1} MB, before {:.1} MB\n{clipped}{lost}written    {}\n",
             self.splats,
             self.sh_degree,
             self.bytes as f64 / 1e6,
@@ -126,7 +133,9 @@ pub fn convert(config: &SplatConvertConfig, progress: &dyn Progress) -> Result<S
         splat_files::write(&config.output, &file, config.overwrite)?;
         let size = |path: &Path| std::fs::metadata(path).map_or(0, |data| data.len());
         let SplatFile { splats, layout, .. } = &file;
-        let range = SplatFormat::of_ending(&config.output).and_then(SplatFormat::colour_range);
+        let format = format_of(&config.output)?;
+        let range = format.colour_range();
+        let labels = file.labels.iter().filter(|_| !format.holds_labels()).flat_map(|labels| &labels.of);
         let is_clipped =
             |splat: &Splat| range.is_some_and(|[low, high]| splat.colour.iter().any(|c| *c < low || *c > high));
         Ok(SplatConvertReport {
@@ -134,6 +143,7 @@ pub fn convert(config: &SplatConvertConfig, progress: &dyn Progress) -> Result<S
             flat: file.is_flat(),
             sh_degree: layout.sh_degree,
             clipped: splats.iter().filter(|splat| is_clipped(splat)).count(),
+            labels_lost: labels.filter(|label| !label.is_none()).count(),
             bytes_before: size(&config.splats),
             bytes: size(&config.output),
         })

@@ -2,11 +2,16 @@
 
 use std::path::PathBuf;
 
+use ::priors::PriorsError;
 use ::splats::SplatError;
+use camera::SimilarityError;
+use city::ModelError;
+use cityfiles::CityError;
 use crs::CrsError;
 use io::raster::RasterError;
 use io::rpc::RpcReadError;
-use io::splat_ply::SplatPlyError;
+use io::similarity::SimilarityFileError;
+use io::splat_ply::{LocalOrigin, SplatPlyError};
 use numeric::Cancelled;
 
 use job::corrections::CorrectionsError;
@@ -85,6 +90,48 @@ pub enum SplatsJobError {
         name: String,
         /// Name of the lens model.
         model: &'static str,
+    },
+    /// The city model cannot be read.
+    #[error(transparent)]
+    City(#[from] CityError),
+    /// The triangles of the city model cannot be made.
+    #[error(transparent)]
+    CityModel(#[from] ModelError),
+    /// The triangles of the city model cannot be searched, or its place cannot be used.
+    #[error(transparent)]
+    Priors(#[from] PriorsError),
+    /// The city model has no usable surface of a building.
+    #[error("no surface of a building in the model's {objects} objects can be used: {}", path.display())]
+    NoSurface {
+        /// The model.
+        path: PathBuf,
+        /// Number of its objects.
+        objects: usize,
+    },
+    /// The similarity from the city model to the splats cannot be read.
+    #[error(transparent)]
+    Transform(#[from] SimilarityFileError),
+    /// The origin of splats or city model is not finite.
+    #[error(transparent)]
+    Similarity(#[from] SimilarityError),
+    /// Nothing says how a city model lies to the splats.
+    #[error("the splats do not say where on a map they lie, expected the similarity from the city model to them: {}", path.display())]
+    NotPlaced {
+        /// The splats.
+        path: PathBuf,
+    },
+    /// Splats and city model lie on different maps.
+    #[error(
+        "the splats are in {} above the {}, the city model is in {city} above {vertical}; convert the city model first",
+        splats.crs, splats.vertical
+    )]
+    OtherMap {
+        /// The origin of the splats.
+        splats: Box<LocalOrigin>,
+        /// Definition of the map of the city model.
+        city: String,
+        /// Vertical datum of the city model.
+        vertical: String,
     },
     /// Two views have the same name.
     #[error("two views would be written as {name}")]

@@ -203,7 +203,7 @@ fn make_and_write(config: &SplatsConfig, progress: &dyn Progress) -> Result<Spla
     // `render` looks through the same cameras.
     let corrections = Corrections::for_surface(&config.dsm, &config.corrections)?.of_images(&config.images);
     corrections.write(&pointing_path(&config.output), config.overwrite)?;
-    let file = SplatFile { splats: scene.splats, harmonics: None, layout, origin: Some(local) };
+    let file = SplatFile { splats: scene.splats, harmonics: None, labels: None, layout, origin: Some(local) };
     io::splat_files::write(&config.output, &file, config.overwrite).map_err(FileError::write)?;
     write_renderings(config, &scene.renderings)?;
     Ok(SplatsReport::new(config, scene.report))

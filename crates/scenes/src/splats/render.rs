@@ -4,7 +4,8 @@
 //! The folder holds `colour/NAME.png` (over black), `alpha/NAME.png` (accumulated opacity),
 //! `height/NAME.npy` (metres above the datum of the origin where half of the light is stopped, NaN
 //! elsewhere), for perspective cameras `depth/NAME.npy` (metres along the optical axis to the same
-//! place), and `report.json`. Pictures are compared over the pixels that splats cover by more
+//! place), and `report.json`. Splats with labels also give `class/NAME.npy` and `object/NAME.npy`,
+//! in the numbers of the maps of priors, with the names in `labels.json`. Pictures are compared over the pixels that splats cover by more
 //! than half, and over all. Flat splats through pinholes are drawn as trainings and meshes draw
 //! them (2DGS), and their depths are means by weight; others are mixed where they lie on one
 //! surface. Satellite images have units of their own, so they are compared after a gain and an
@@ -14,11 +15,11 @@ use std::borrow::Cow;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
-use ::splats::{LensSplatCamera, Rendering, RpcSplatCamera, psnr_db, ssim};
+use ::splats::{LensSplatCamera, Rendering, RpcSplatCamera, SplatCamera, psnr_db, render_labels, ssim};
 use ::train::{Drawing, PinholeView, Registers, Surfel, SurfelCamera};
 use camera::{Lens, LensModel};
-use crs::MapProjection;
-use gaussian::Splat;
+use crs::{CrsError, MapProjection};
+use gaussian::{Splat, SplatLabel};
 use io::colmap::{ColmapModel, ColmapView};
 use io::npy;
 use io::raster::{write_png_gray, write_png_rgb};
@@ -41,6 +42,8 @@ use job::report_page;
 use job::threads::install;
 
 const REPORT: &str = "report.json";
+/// Names of the numbers in the maps of labels.
+const LABELS: &str = "labels.json";
 /// Least accumulated opacity of the pixels that are compared.
 const COVERED: f32 = 0.5;
 
@@ -170,7 +173,7 @@ pub fn render(config: &SplatRenderConfig, progress: &dyn Progress) -> Result<Spl
     report_page::refuse_existing(&report_path, config.overwrite)?;
     config.validate()?;
     let folder = OutputFolder::take(&config.output)?;
-    folder.check_folders(["colour", "alpha", "height", "depth"])?;
+    folder.check_folders(["colour", "alpha", "height", "depth", "class", "object"])?;
     let file = io::splat_files::read(&config.splats)?;
     let unplaced = || LocalOrigin::new(UNKNOWN_FRAME, UNKNOWN_DATUM, [0.0; 3]);
     // Files of other programs lie in the frame of their cameras.
@@ -179,6 +182,9 @@ pub fn render(config: &SplatRenderConfig, progress: &dyn Progress) -> Result<Spl
         found => found.ok_or_else(|| SplatsJobError::NoOrigin { path: io::splat_ply::origin_path(&config.splats) })?,
     };
     folder.remove(REPORT)?;
+    if let Some(labels) = &file.labels {
+        files::write_json(&config.output.join(LABELS), &labels.table, config.overwrite)?;
+    }
     let pictures = config.pictures.clone().or_else(|| config.cameras.as_deref().and_then(pictures_of_dataset));
     let (taken, views) = (HashSet::new(), Vec::new());
     let session = RenderSession { config, folder: &folder, file: &file, origin, pictures, taken, views };
@@ -263,8 +269,8 @@ impl RenderSession<'_> {
             .ok_or_else(|| SplatsJobError::NotSeen { target: "the splats", path: path.to_owned() })?;
         let name = Path::new(path.file_name().unwrap_or_default());
         let sight = camera.towards_sensor().map(|c| -c);
-        let rendering = ::splats::render(&self.seen(|_| sight), &camera)?;
-        self.keep(name, false, &rendering, Reference::OwnUnits(image.pixels))
+        let drawn = self.mixed(&self.seen(|_| sight), &camera)?;
+        self.keep(name, false, &drawn, Reference::OwnUnits(image.pixels))
     }
 
     fn render_perspective(&mut self, view: &ColmapView, model: Option<&ColmapModel>) -> Result<(), SplatsJobError> {
@@ -292,16 +298,27 @@ impl RenderSession<'_> {
         let centre = view.pose.centre;
         let splats = self.seen(|splat| [0, 1, 2].map(|i| f64::from(splat.position[i]) - centre[i]));
         let is_flat = self.file.is_flat();
-        let rendering = match (is_flat, small) {
-            (true, Some(camera)) => flat(&splats, &camera),
+        let drawn = match (is_flat, small) {
+            (true, Some(camera)) => flat(&splats, self.labels(), &camera),
             (_, None) if shrink > 1 => return Err(refused()),
-            (_, None) => ::splats::render(&splats, &LensSplatCamera { lens, pose: &view.pose })?,
+            (_, None) => self.mixed(&splats, &LensSplatCamera { lens, pose: &view.pose })?,
             (false, Some(PinholeView { focal_px: [fx, fy], principal_px: [cx, cy], size: [width, height], .. })) => {
                 let lens = Lens::new(width, height, LensModel::Pinhole, &[fx, fy, cx, cy]).map_err(|_| refused())?;
-                ::splats::render(&splats, &LensSplatCamera { lens: &lens, pose: &view.pose })?
+                self.mixed(&splats, &LensSplatCamera { lens: &lens, pose: &view.pose })?
             }
         };
-        self.keep(Path::new(&view.name), true, &rendering, reference)
+        self.keep(Path::new(&view.name), true, &drawn, reference)
+    }
+
+    /// Returns the labels of the splats, where they have some.
+    fn labels(&self) -> Option<&[SplatLabel]> {
+        self.file.labels.as_ref().map(|labels| labels.of.as_slice())
+    }
+
+    /// Draws splats that are mixed where they lie on one surface.
+    fn mixed(&self, splats: &[Splat], camera: &impl SplatCamera) -> Result<Drawn, CrsError> {
+        let labels = self.labels().map(|labels| render_labels(splats, labels, camera)).transpose()?;
+        Ok(Drawn { rendering: ::splats::render(splats, camera)?, labels })
     }
 
     /// Returns the splats with the colours that their harmonics have along a direction.
@@ -320,14 +337,18 @@ impl RenderSession<'_> {
         &mut self,
         name: &Path,
         with_depth: bool,
-        rendering: &Rendering,
+        drawn: &Drawn,
         reference: Reference,
     ) -> Result<(), SplatsJobError> {
+        let rendering = &drawn.rendering;
         let name = files::flat_stem(name);
         if !self.taken.insert(name.clone()) {
             return Err(SplatsJobError::SameName { name });
         }
         self.write(&name, with_depth, rendering)?;
+        if let Some(labels) = &drawn.labels {
+            self.write_labels(&name, labels)?;
+        }
         let size = [rendering.colour.width(), rendering.colour.height()];
         let covered = rendering.coverage.map(|c| *c > COVERED);
         let all = rendering.coverage.map(|_| true);
@@ -362,6 +383,20 @@ impl RenderSession<'_> {
         }
         Ok(())
     }
+
+    fn write_labels(&self, name: &str, labels: &Grid<SplatLabel>) -> Result<(), FileError> {
+        let path = |kind: &str| Ok::<_, FileError>(self.folder.subfolder(kind)?.join(format!("{name}.npy")));
+        let (overwrite, shape) = (self.config.overwrite, [labels.height(), labels.width()]);
+        let (class, object) = (labels.map(|label| label.class), labels.map(|label| label.object));
+        npy::write(path("class")?, &shape, class.data(), overwrite).map_err(FileError::write)?;
+        npy::write(path("object")?, &shape, object.data(), overwrite).map_err(FileError::write)
+    }
+}
+
+/// What a camera sees, with the labels of the pixels where splats have some.
+struct Drawn {
+    rendering: Rendering,
+    labels: Option<Grid<SplatLabel>>,
 }
 
 impl Reference {
@@ -388,7 +423,7 @@ impl Reference {
 
 /// Draws flat splats as trainings and meshes do: the rule of 2DGS. Depths are means by weight
 /// there.
-fn flat(splats: &[Splat], camera: &PinholeView) -> Rendering {
+fn flat(splats: &[Splat], labels: Option<&[SplatLabel]>, camera: &PinholeView) -> Drawn {
     let surfels: Vec<Surfel> = splats.iter().map(Surfel::of_splat).collect();
     let drawing = Drawing::new(&surfels, camera, Registers::Longest);
     let (images, [width, height]) = (drawing.images(), camera.size);
@@ -403,14 +438,17 @@ fn flat(splats: &[Splat], camera: &PinholeView) -> Rendering {
     let grid = |value: &dyn Fn(usize) -> f32| {
         Grid::from_vec(width, height, (0..width * height).map(value).collect()).expect("as many values as pixels")
     };
+    let labels =
+        labels.map(|labels| Grid::from_vec(width, height, drawing.labels(labels)).expect("as many labels as pixels"));
     let colours = (0..width * height).map(|pixel| images.colour.each_ref().map(|plane| plane[pixel])).collect();
-    Rendering {
+    let rendering = Rendering {
         colour: Grid::from_vec(width, height, colours).expect("as many values as pixels"),
         coverage: grid(&|pixel| images.coverage[pixel]),
         mean_height_m: grid(&|pixel| local_height(pixel, depth(pixel, 0.0))),
         median_height_m: grid(&|pixel| local_height(pixel, depth(pixel, COVERED))),
         median_depth_m: grid(&|pixel| depth(pixel, COVERED)),
-    }
+    };
+    Drawn { rendering, labels }
 }
 
 /// Applies to each channel of a picture the gain and offset that bring it closest to a rendering

@@ -57,6 +57,7 @@ pub(super) fn write_splats(
     let file = SplatFile {
         splats: state.surfels.iter().map(|s| s.to_splat(THICKNESS_M)).collect(),
         harmonics: state.harmonics.to_splats(),
+        labels: None,
         layout: SplatLayout { form: SplatForm::Discs, sh_degree: state.harmonics.degree() },
         origin: Some(origin.clone()),
     };

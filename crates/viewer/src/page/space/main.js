@@ -2,6 +2,7 @@
 
 import { Camera, dot, unit } from "./camera.js";
 import { Mesh, parts } from "./mesh.js";
+import { Objects } from "./objects.js";
 import { Splats, link } from "./splats.js";
 
 const $ = (id) => document.getElementById(id);
@@ -151,12 +152,25 @@ camera.clicked = async (x, y) => {
   const found = await Promise.all(shown.map(({ item }) => item.pick(view.eye, direction, 1 / view.focal[0])));
   let nearest = null;
   found.forEach((hit, i) => {
-    if (hit && (!nearest || hit.distance < nearest.distance)) nearest = { ...hit, layer: shown[i].layer };
+    if (hit && (!nearest || hit.distance < nearest.distance)) nearest = { ...hit, ...shown[i] };
   });
   place = nearest && view.eye.map((c, i) => c + nearest.distance * direction[i]);
   readOut(nearest);
+  choose(nearest);
   mark(view);
 };
+
+/** Shows what is known of the object of a click, and marks its splats. */
+function choose(nearest) {
+  const objects = nearest?.item.objects;
+  const met = objects ? objects.met(nearest.parts) : null;
+  layers.forEach(({ item }) => (item.chosen = met && item === nearest.item ? met.object : 0));
+  $("object").hidden = !met;
+  const lines = met ? [...objects.lines(met), ["splats", objects.count(met.object).toLocaleString("en")]] : [];
+  const make = (kind, textContent) => Object.assign(document.createElement(kind), { textContent });
+  $("attributes").replaceChildren(...lines.flatMap(([name, text]) => [make("dt", name), make("dd", text)]));
+  redraw();
+}
 
 function readOut(nearest) {
   if (!place) return void ($("readout").textContent = "There is nothing at this place.");
@@ -215,7 +229,9 @@ async function load() {
     const words = await (await ask(`splats/${number}.bin`)).arrayBuffer();
     const harmonics = layer.degree ? await (await ask(`harmonics/${number}.bin`)).arrayBuffer() : new ArrayBuffer(0);
     ball ??= around(new Float32Array(words), 8, layer.shift);
-    entry(layer, new Splats(gl, layer, words, harmonics, redraw), "splats");
+    const labels = layer.labelled ? await (await ask(`labels/${number}.bin`)).arrayBuffer() : null;
+    const objects = labels ? new Objects(labels, await (await ask(`objects/${number}.json`)).json()) : null;
+    entry(layer, new Splats(gl, layer, words, harmonics, objects, redraw), "splats");
   }
   for (const [number, layer] of scene.meshes.entries()) {
     message(`Loading ${layer.name} …`);

@@ -70,7 +70,7 @@ function axes(at) {
 
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 
-/** Returns where half of the light of a ray has met splats: the distance along the ray. */
+/** Returns where half of the light of a ray has met splats, the distance along the ray, and the splats with their weights. */
 function pick({ eye, direction, pixel }) {
   const hits = [];
   for (let at = 0; at < words.length; at += WORDS) {
@@ -89,13 +89,17 @@ function pick({ eye, direction, pixel }) {
     const squared = dot(nearest, nearest);
     const small = (2 * across) / (pixel * along) ** 2;
     const alpha = Math.min(0.99, half(words[at + 4] >>> 16) * Math.exp(-Math.min(squared, small) / 2));
-    if (alpha >= 1 / 255 && t > 0) hits.push([squared <= small ? t : along, alpha]);
+    if (alpha >= 1 / 255 && t > 0) hits.push([squared <= small ? t : along, alpha, at / WORDS]);
   }
   hits.sort((a, b) => a[0] - b[0]);
   let open = 1;
-  for (const [distance, alpha] of hits) {
+  let middle = null;
+  const parts = [];
+  for (const [distance, alpha, splat] of hits) {
+    if (open < 1e-4) break;
+    parts.push([splat, open * alpha]);
     open *= 1 - alpha;
-    if (open < 0.5) return { distance };
+    if (open < 0.5) middle ??= distance;
   }
-  return null;
+  return middle === null ? null : { distance: middle, parts };
 }

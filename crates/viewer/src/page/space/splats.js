@@ -41,7 +41,8 @@ vec3 shaded(vec3 constant, vec3 d) {
 const VERTEX = `#version 300 es
 precision highp float; precision highp int; precision highp usampler2D;
 layout(location = 0) in uint number;
-uniform usampler2D splats, harmonics;
+uniform usampler2D splats, harmonics, objects;
+uniform uint chosen;
 uniform int across, texels, degree;
 uniform bool discs;
 uniform mat3 turn;
@@ -127,6 +128,9 @@ void main() {
   if (any(greaterThan(low, high))) return;
   offset = mix(low, high, vec2(gl_VertexID & 1, gl_VertexID >> 1));
   colour = vec4(shaded(vec3(rg, ba.x), normalize(sight)), ba.y);
+  if (chosen != 0u && texelFetch(objects, ivec2(int(number) % across, int(number) / across), 0).x == chosen) {
+    colour.rgb = mix(colour.rgb, vec3(1.0, 0.72, 0.1), 0.6);
+  }
   vec2 clip = 2.0 * (pixel + offset + 0.5) / size - 1.0;
   float depth = (range.y + range.x) / (range.y - range.x) - 2.0 * range.x * range.y / ((range.y - range.x) * centre.z);
   // What lies beyond the range is drawn, too.
@@ -153,15 +157,16 @@ void main() {
 }`;
 
 export class Splats {
-  /** Takes a layer, and the answer of the server for it. */
-  constructor(gl, layer, words, harmonics, drawn) {
-    Object.assign(this, { gl, layer, drawn, count: words.byteLength / 32, length: 0, serial: 0, waits: null, busy: false });
+  /** Takes a layer, the answer of the server for it, and the objects of its splats where they have some. */
+  constructor(gl, layer, words, harmonics, objects, drawn) {
+    Object.assign(this, { gl, layer, objects, drawn, chosen: 0, count: words.byteLength / 32, length: 0, serial: 0, waits: null, busy: false });
     this.program = link(gl, VERTEX, FRAGMENT);
     this.across = gl.getParameter(gl.MAX_TEXTURE_SIZE);
     const texels = Math.max(2 * this.count, harmonics.byteLength / 16);
     if (texels > this.across * this.across) throw new Error(`${layer.name} has more splats than this browser can draw.`);
-    this.texture = this.upload(words);
-    this.harmonics = this.upload(harmonics.byteLength ? harmonics : new ArrayBuffer(16));
+    this.texture = this.upload(new Uint32Array(words), 4);
+    this.harmonics = this.upload(new Uint32Array(harmonics.byteLength ? harmonics : 4), 4);
+    this.numbers = this.upload(objects?.objects ?? new Uint32Array(1), 1);
     this.buffer = gl.createBuffer();
     this.vertices = gl.createVertexArray();
     gl.bindVertexArray(this.vertices);
@@ -177,18 +182,19 @@ export class Splats {
     this.worker.postMessage({ words }, [words]);
   }
 
-  upload(bytes) {
+  /** Makes a texture of words, of which each texel has some. */
+  upload(words, channels) {
     const { gl, across } = this;
-    const words = new Uint32Array(bytes);
-    const texels = words.length / 4;
+    const texels = words.length / channels;
+    const [kind, format] = channels === 4 ? [gl.RGBA32UI, gl.RGBA_INTEGER] : [gl.R32UI, gl.RED_INTEGER];
     const [rows, rest] = [Math.floor(texels / across), texels % across];
     const texture = gl.createTexture();
     gl.bindTexture(gl.TEXTURE_2D, texture);
-    gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGBA32UI, across, Math.max(1, rows + (rest ? 1 : 0)));
+    gl.texStorage2D(gl.TEXTURE_2D, 1, kind, across, Math.max(1, rows + (rest ? 1 : 0)));
     const put = (row, width, height, from) =>
-      gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, row, width, height, gl.RGBA_INTEGER, gl.UNSIGNED_INT, words, from);
+      gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, row, width, height, format, gl.UNSIGNED_INT, words, from);
     if (rows) put(0, across, rows, 0);
-    if (rest) put(rows, rest, 1, 4 * across * rows);
+    if (rest) put(rows, rest, 1, channels * across * rows);
     for (const side of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, side, gl.NEAREST);
     return texture;
   }
@@ -230,7 +236,7 @@ export class Splats {
     return !this.busy && !this.waits;
   }
 
-  /** Returns the distance along a ray at which it meets the splats, or null. */
+  /** Returns the distance along a ray at which it meets the splats, and these with their weights; or null. */
   pick(eye, direction, pixel) {
     const serial = ++this.serial;
     return new Promise((found) => {
@@ -243,12 +249,14 @@ export class Splats {
     const { gl, program, layer } = this;
     const at = (name) => gl.getUniformLocation(program, name);
     gl.useProgram(program);
-    [this.texture, this.harmonics].forEach((texture, unit) => {
+    [this.texture, this.harmonics, this.numbers].forEach((texture, unit) => {
       gl.activeTexture(gl.TEXTURE0 + unit);
       gl.bindTexture(gl.TEXTURE_2D, texture);
     });
     gl.uniform1i(at("splats"), 0);
     gl.uniform1i(at("harmonics"), 1);
+    gl.uniform1i(at("objects"), 2);
+    gl.uniform1ui(at("chosen"), this.chosen);
     gl.uniform1i(at("across"), this.across);
     gl.uniform1i(at("degree"), layer.degree);
     gl.uniform1i(at("texels"), Math.ceil((3 * ((layer.degree + 1) ** 2 - 1)) / 8));
