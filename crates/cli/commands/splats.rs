@@ -1,7 +1,7 @@
 //! `skysweep splats`: Gaussian splats of a surface model and its images, as the PLY that 3DGS
 //! viewers and trainers read. `skysweep splats render` looks at them again, through images and
-//! perspective cameras, `skysweep splats convert` brings them to other formats, and `skysweep splats
-//! label` carries class and object of a city model onto them.
+//! perspective cameras, `skysweep splats convert` brings them to other formats, and
+//! `skysweep splats label` carries class and object of a city model onto them.
 
 use std::path::{Path, PathBuf};
 

@@ -259,7 +259,7 @@ fn splats_carry_class_and_object_to_maps() {
         }
 
         // Other formats say what they leave out.
-        let sog = format!("{name}.sog");
+        let sog = format!("{name}_packed.sog");
         let told = skysweep(&["convert", &labelled, &sog]).code(0);
         assert!(String::from_utf8_lossy(&told.get_output().stdout).contains("are left out: only PLY holds them"));
         assert_eq!(io::splat_files::read(&bench.path(&sog)).unwrap().labels, None);

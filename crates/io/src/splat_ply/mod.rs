@@ -12,8 +12,8 @@
 //! - `opacity`: logit of the opacity
 //! - `scale_0..2`: natural logarithm of the standard deviations in metres; 2DGS has only two
 //! - `rot_0..3`: quaternion, w first
-//! - `class` (`uchar`) and `object` (`uint`): number of the class, and of the object of the city model
-//!   that the splat stands for; only where splats have labels
+//! - `class` (`uchar`) and `object` (`uint`): number of the class, and of the object of the city
+//!   model that the splat stands for; only where splats have labels
 //!
 //! The local origin is in a file of its own, `NAME.origin.json`, because not every loader skips PLY
 //! comments. The table of classes and objects is `NAME.objects.json`. Loaders look properties up by

@@ -36,6 +36,7 @@ from .reports import (
     RpcInfoReport,
     SimulateReport,
     SplatConvertReport,
+    SplatLabelReport,
     SplatRenderReport,
     SplatsReport,
     SplitJobReport,
@@ -73,6 +74,7 @@ __all__ = [
     "splats",
     "render_splats",
     "convert_splats",
+    "label_splats",
     "train",
     "mesh",
     "align",
@@ -1980,6 +1982,50 @@ def convert_splats(
         >>> report = skysweep.convert_splats("splats.ply", "splats.spz", sh_degree=0)
     """
     return run_job("convert_splats", locals(), SplatConvertReport)
+
+
+@job
+def label_splats(
+    splats: PathLike,
+    city: PathLike,
+    output: PathLike,
+    *,
+    tolerance_m: float = 0.5,
+    transform: PathLike | None = None,
+    vertical: str | None = None,
+    threads: int | None = None,
+    overwrite: bool = False,
+    progress: Progress = None,
+) -> SplatLabelReport:
+    """Carry class and object of a city model onto splats.
+
+    Args:
+        splats: File of splats of any format, with its origin beside it where it lies on a map.
+        city: City model: CityJSON, CityGML, OBJ, PLY.
+        output: File to write, a PLY: the other formats hold no labels. The origin and the table of
+            the objects go beside it.
+        tolerance_m: Greatest root mean square distance of a splat's mass from the surface that it
+            takes, metres of the city model.
+        transform: Similarity from the city model to the frame that the origin of the splats is
+            counted in (JSON), where the two do not lie on one map.
+        vertical: Vertical datum of the heights of the city model; the one that its file states when
+            `None`.
+        threads: Worker threads; one per core when `None`.
+        overwrite: Whether existing files may be replaced.
+        progress: `True` for a bar (tqdm), or a function that takes a `Step`; see `skysweep.Step`.
+
+    Returns:
+        The report of the job, as the command's ``--json`` has it.
+
+    Raises:
+        TypeError: A keyword that the job does not have; the text names those that it has.
+        SkysweepError: The job has no result; see its subclasses.
+
+    Example:
+        >>> import skysweep
+        >>> report = skysweep.label_splats("splats.ply", "town.city.json", "labelled.ply")
+    """
+    return run_job("label_splats", locals(), SplatLabelReport)
 
 
 @job

@@ -153,6 +153,7 @@ __all__ = [
     "SimulateReport",
     "SimulationConfig",
     "SplatConvertReport",
+    "SplatLabelReport",
     "SplatRenderReport",
     "SplatRenderView",
     "SplatsImageReport",
@@ -3947,11 +3948,34 @@ class SplatConvertReport(Report):
     """Splats with a colour that the format cannot hold, which was brought to the nearest that it
     can: SPZ has none below -0.44 and above 1.44."""
 
+    labels_lost: int
+    """Splats with a class and an object of a city model, which the format cannot hold: only PLY
+    does."""
+
     bytes_before: int
     """Size of the file read, bytes."""
 
     bytes: int
     """Size of the file written, bytes."""
+
+
+class SplatLabelReport(Report):
+    """What the splats were labelled with."""
+
+    splats: int
+    """Number of splats."""
+
+    labelled: int
+    """Number of splats that lie on a surface of the city model."""
+
+    classes: dict[str, int]
+    """Number of labelled splats of each class."""
+
+    objects: int
+    """Number of objects that have splats."""
+
+    objects_of_model: int
+    """Number of objects with surfaces in the city model."""
 
 
 class SplatRenderReport(Report):

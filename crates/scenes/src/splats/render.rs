@@ -4,12 +4,12 @@
 //! The folder holds `colour/NAME.png` (over black), `alpha/NAME.png` (accumulated opacity),
 //! `height/NAME.npy` (metres above the datum of the origin where half of the light is stopped, NaN
 //! elsewhere), for perspective cameras `depth/NAME.npy` (metres along the optical axis to the same
-//! place), and `report.json`. Splats with labels also give `class/NAME.npy` and `object/NAME.npy`,
-//! in the numbers of the maps of priors, with the names in `labels.json`. Pictures are compared over the pixels that splats cover by more
-//! than half, and over all. Flat splats through pinholes are drawn as trainings and meshes draw
-//! them (2DGS), and their depths are means by weight; others are mixed where they lie on one
-//! surface. Satellite images have units of their own, so they are compared after a gain and an
-//! offset per channel.
+//! place), and `report.json`. Splats with labels also give `class/NAME.npy` and `object/NAME.npy`
+//! in the numbers of the maps of priors, with the names in `labels.json`. Pictures are compared
+//! over the pixels that splats cover by more than half, and over all. Flat splats through pinholes
+//! are drawn as trainings and meshes draw them (2DGS), and their depths are means by weight; others
+//! are mixed where they lie on one surface. Satellite images have units of their own, so they are
+//! compared after a gain and an offset per channel.
 
 use std::borrow::Cow;
 use std::collections::HashSet;
