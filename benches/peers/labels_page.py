@@ -67,7 +67,8 @@ def shown(page):
     if page.locator("#object").is_hidden():
         return {}
     names, texts = (page.locator(f"#attributes {kind}").all_inner_texts() for kind in ("dt", "dd"))
-    return dict(zip(names, texts))
+    # Those of a part come before those of its building, which may have the same names.
+    return dict(reversed(list(zip(names, texts))))
 
 
 def click(page, x, y):

@@ -254,7 +254,6 @@ fn splats_carry_class_and_object_to_maps() {
                 }
                 assert!(found.contains(&missing) && found.iter().any(|number| *number != missing));
             }
-            println!("{name} {kind}: {same} of {all} pixels away from edges are the same");
             assert!(same as f64 >= 0.98 * f64::from(all), "{name} {kind}: {same} of {all}");
         }
 
