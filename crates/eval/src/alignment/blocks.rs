@@ -1,10 +1,11 @@
 //! Shifts that differ from place to place: jitter, drifts and seams that one translation leaves.
 //!
-//! The surfaces are divided into blocks. Each block is divided into tiles like a chessboard, and the
-//! tiles of either colour find a shift for themselves: the one with the least mean of the clipped
-//! differences, which a few walls on much flat ground tell. The block's shift is their mean, and how far they differ tells how well it is known.
-//! A flat block tells less than a steep one, so the variance of a block is taken as inverse to the
-//! sum of its squared slopes, with one factor that the differences of all blocks give.
+//! The surfaces are divided into blocks. Each block is divided into tiles like a chessboard, and
+//! the tiles of either colour find a shift for themselves: the one with the least mean of the
+//! clipped differences, which a few walls on much flat ground tell. The block's shift is their mean,
+//! and how far they differ tells how well it is known. A flat block tells less than a steep one, so
+//! the variance of a block is taken as inverse to the sum of its squared slopes, with one factor
+//! that the differences of all blocks give.
 //!
 //! Shifts that noise explains are not applied. The variance τ² of the true shifts between blocks
 //! follows from the scatter of the found ones beyond their own variances (DerSimonian and Laird
@@ -84,7 +85,7 @@ impl LocalShifts {
         let around =
             |start: [isize; 2]| blocks.each(|bounds| sideways(test, reference, metres, bounds, start, measure));
         let mut sideways = around([0; 2]);
-        // Where the shift of the whole is off by cells, the blocks are searched around their median.
+        // Where the shift of the whole is off by cells, blocks are searched around their median.
         let start = [0, 1].map(|axis| {
             let mut shifts: Vec<f64> = sideways.iter().flatten().map(|found| found[axis].mean()).collect();
             upper_median(&mut shifts).unwrap_or(0.0).round() as isize

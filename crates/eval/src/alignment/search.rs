@@ -272,8 +272,8 @@ impl Search<'_> {
         best
     }
 
-    /// Returns the vertex of the paraboloid through the squared score around a minimum. It averages the
-    /// roughness that noise gives to the criterion. Returns the minimum itself if it is clearly
+    /// Returns the vertex of the paraboloid through the squared score around a minimum. It averages
+    /// the roughness that noise gives to the criterion. Returns the minimum itself if it is clearly
     /// better (surfaces without noise), or if there is no vertex.
     fn levelled(&self, samples: &[Sample], minimum: Candidate) -> Candidate {
         let stencil: Vec<(f64, f64)> =

@@ -1096,6 +1096,7 @@ def diff(
     *,
     alignment: Literal["none", "z", "xyz", "nuth-kaab"] = "xyz",
     search_m: float = 5.0,
+    block_m: float | None = None,
     sigma_m: float | None = None,
     use_filled: bool = False,
     before_vertical: str | None = None,
@@ -1118,6 +1119,8 @@ def diff(
         output: Folder for the results.
         alignment: Shift of the second surface that is removed first.
         search_m: Radius of the horizontal search, metres.
+        block_m: Side of blocks that are moved on their own after the shift, metres: against jitter
+            and drifts, which one shift leaves. `None` moves the surface as a whole.
         sigma_m: Standard deviation of the heights of a surface without a `sigma.tif` beside it,
             metres.
         use_filled: Whether filled cells count as observed.

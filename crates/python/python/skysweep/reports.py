@@ -52,6 +52,7 @@ __all__ = [
     "DamagedBuilding",
     "Date",
     "DepthSource",
+    "DiffBlocks",
     "DiffRegion",
     "DiffReport",
     "DistanceStatistics",
@@ -1142,6 +1143,29 @@ class DepthSource(Report):
     _absent = {"splats": None, "maps": None}
 
 
+class DiffBlocks(Report):
+    """Local shifts of the second surface, after the shift of the whole."""
+
+    side_m: float
+    """Side of the blocks as asked for, metres."""
+
+    count: int
+    """Number of blocks."""
+
+    found: int
+    """Blocks that found a shift of their own; the others take those beside them."""
+
+    deviation_m: list[float]
+    """Standard deviations of the true local shifts east, north and up, metres; 0 where noise
+    explains what was found."""
+
+    largest_sideways_m: float
+    """Largest local shift sideways, metres."""
+
+    largest_up_m: float
+    """Largest local shift up or down, metres."""
+
+
 class DiffRegion(Report):
     """A region of change with its number."""
 
@@ -1234,6 +1258,9 @@ class DiffReport(Report):
     shift: Shift
     """Shift that was added to the second surface, metres."""
 
+    blocks: DiffBlocks | None
+    """What blocks were moved by besides, if that was asked for."""
+
     sigma_factor: float
     """Factor that the stated deviations needed to explain the differences of unchanged ground."""
 
@@ -1273,7 +1300,9 @@ class DiffReport(Report):
     notes: list[str]
     """Choices and doubts that a reader must know."""
 
-    _parts = {"shift": "Shift", "correlation": "ErrorCorrelation", "regions": "DiffRegion", "total": "Volume", "areas": "AreaVolume", "parameters": "ChangeConfig"}
+    _parts = {"shift": "Shift", "blocks": "DiffBlocks", "correlation": "ErrorCorrelation", "regions": "DiffRegion", "total": "Volume", "areas": "AreaVolume", "parameters": "ChangeConfig"}
+
+    _absent = {"blocks": None}
 
 
 class DistanceStatistics(Report):
