@@ -2,10 +2,10 @@
 //!
 //! The surfaces are divided into blocks. Each block is divided into tiles like a chessboard, and
 //! the tiles of either colour find a shift for themselves: the one with the least mean of the
-//! clipped differences, which a few walls on much flat ground tell. The block's shift is their mean,
-//! and how far they differ tells how well it is known. A flat block tells less than a steep one, so
-//! the variance of a block is taken as inverse to the sum of its squared slopes, with one factor
-//! that the differences of all blocks give.
+//! clipped differences, which a few walls on much flat ground tell. The block's shift is their
+//! mean, and how far they differ tells how well it is known. A flat block tells less than a steep
+//! one, so the variance of a block is taken as inverse to the sum of its squared slopes, with one
+//! factor that the differences of all blocks give.
 //!
 //! Shifts that noise explains are not applied. The variance τ² of the true shifts between blocks
 //! follows from the scatter of the found ones beyond their own variances (DerSimonian and Laird
