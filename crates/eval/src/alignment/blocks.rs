@@ -368,7 +368,7 @@ mod tests {
             let (column, row) = ((i % SIZE) as f64, (i / SIZE) as f64);
             let (x, y) = (column - shift(row), row);
             let plot = ((x / 60.0).floor() as i64 * 97 + (y / 60.0).floor() as i64) as u64;
-            let is_house = hash64(plot) % 5 == 0 && x.rem_euclid(60.0) < 24.0 && y.rem_euclid(60.0) < 30.0;
+            let is_house = hash64(plot).is_multiple_of(5) && x.rem_euclid(60.0) < 24.0 && y.rem_euclid(60.0) < 30.0;
             let error = unit_interval(hash64((i as u64) << 8 ^ noise)) - 0.5;
             (if is_house { 7.0 } else { 0.0 } + 0.1 * error) as f32
         };
