@@ -215,7 +215,7 @@ mod tests {
             for x in 0..width {
                 let row = |j: usize| (0..4).map(|i| rounded(at(4 + x + i, 2 + y + j), wx[i])).sum::<f64>();
                 let expected = (0..4).map(|j| rounded(row(j), wy[j])).sum::<f64>();
-                assert_eq!(f64::from(out[y * width + x]), expected);
+                assert_eq!(f64::from(plain[y * width + x]), expected);
             }
         }
     }
