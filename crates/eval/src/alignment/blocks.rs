@@ -19,8 +19,7 @@ use raster::Grid;
 use rayon::prelude::*;
 
 use crate::alignment::align::MetresFromCells;
-use crate::alignment::registration::{cut, differences, finite, own_shift};
-use crate::alignment::resample::bilinear;
+use crate::alignment::registration::{cut, differences, finite, grown, own_shift};
 use crate::alignment::search::Measure;
 use crate::error::EvalError;
 
@@ -79,7 +78,7 @@ impl LocalShifts {
         let (columns, rows) = (count(reference.width(), along_columns), count(reference.height(), along_rows));
         let blocks = Blocks { size: (reference.width(), reference.height()), columns, rows };
 
-        let mut all = finite(&differences(test, reference, [0.0; 2]));
+        let mut all = finite(&differences(test, reference, |_, _| [0.0; 2]));
         let noise_m = CLIP_NMADS * upper_nmad(&mut all).unwrap_or(0.0);
         let measure = Measure::ClippedMean(noise_m.max(LEAST_CLIP * along_columns.max(along_rows)));
         let around =
@@ -97,12 +96,9 @@ impl LocalShifts {
         if found == 0 {
             return Err(EvalError::NoLocalShift { blocks: columns * rows });
         }
-        let ([along_x, along_y], deviation_x, deviation_y) = {
-            let (x, deviation_x) = shrunk(&axis(&sideways, 0));
-            let (y, deviation_y) = shrunk(&axis(&sideways, 1));
-            ([x, y], deviation_x, deviation_y)
-        };
-        let shifts = along_x.iter().zip(&along_y).map(|(x, y)| [*x, *y, 0.0]).collect();
+        let (columns_moved, deviation_columns) = shrunk(&axis(&sideways, 0));
+        let (rows_moved, deviation_rows) = shrunk(&axis(&sideways, 1));
+        let shifts = columns_moved.into_iter().zip(rows_moved).map(|(columns, rows)| [columns, rows, 0.0]).collect();
         let mut local = Self {
             shifts: Grid::from_vec(columns, rows, shifts).unwrap_or_else(|| Grid::filled(columns, rows, [0.0; 3])),
             side: (reference.width() as f64 / columns as f64, reference.height() as f64 / rows as f64),
@@ -110,12 +106,15 @@ impl LocalShifts {
             deviation_m: [0.0; 3],
             largest_m: (0.0, 0.0),
         };
-        let errors = local.errors(test, reference);
+        let errors = differences(test, reference, |column, row| {
+            let [columns, rows, _] = local.at(column, row);
+            [columns, rows]
+        });
         let (upwards, deviation_z) = shrunk(&axis(&blocks.each(|bounds| upwards(&errors, bounds)), 0));
         for (shift, up) in local.shifts.data_mut().iter_mut().zip(upwards) {
             shift[2] = up;
         }
-        let (x, y) = metres.apply(deviation_x, deviation_y);
+        let (x, y) = metres.apply(deviation_columns, deviation_rows);
         local.deviation_m = [x.abs(), y.abs(), deviation_z];
         local.measure(metres);
         Ok(local)
@@ -159,20 +158,6 @@ impl LocalShifts {
         let shift = |column: usize, row: usize| self.shifts.data()[row * self.shifts.width() + column];
         let mixed = |a: [f64; 3], b: [f64; 3], t: f64| [0, 1, 2].map(|k| a[k] + t * (b[k] - a[k]));
         mixed(mixed(shift(left, top), shift(right, top), u), mixed(shift(left, bottom), shift(right, bottom), u), v)
-    }
-
-    /// Returns test − reference, the test moved sideways.
-    fn errors(&self, test: &Grid<f32>, reference: &Grid<f32>) -> Grid<f32> {
-        let mut out = Grid::filled(reference.width(), reference.height(), f32::NAN);
-        let width = reference.width().max(1);
-        out.data_mut().par_chunks_mut(width).enumerate().for_each(|(row, out)| {
-            for ((column, out), height) in out.iter_mut().enumerate().zip(reference.row(row)) {
-                let shift = self.at(column as f64, row as f64);
-                let moved = bilinear(test, column as f64 - shift[0], row as f64 - shift[1]);
-                *out = moved.map_or(f32::NAN, |moved| (moved - f64::from(*height)) as f32);
-            }
-        });
-        out
     }
 }
 
@@ -225,8 +210,8 @@ fn weighted_mean(known: &[(f64, f64)], between: f64) -> f64 {
     sum / weights
 }
 
-/// Returns the variance of the true values beyond the variance of each (DerSimonian and Laird 1986,
-/// eq. 8).
+/// Returns the variance of the true values beyond the variance of each (DerSimonian and Laird
+/// 1986).
 fn true_variance(known: &[(f64, f64)]) -> f64 {
     let mean = weighted_mean(known, 0.0);
     let sum = |power: i32| known.iter().map(|(_, variance)| variance.recip().powi(power)).sum::<f64>();
@@ -244,14 +229,13 @@ fn sideways(
     start: [isize; 2],
     measure: Measure,
 ) -> Option<[Found; 2]> {
-    let wide = bounds.each_ref().map(|bound| bound.start..bound.end + 2 * RIM);
-    let test = cut(test, &wide, start.map(|cells| -cells - RIM as isize), 0);
+    let test = cut(test, &grown(bounds, RIM), start.map(|cells| -cells - RIM as isize), 0);
     let whole = cut(reference, bounds, [0; 2], RIM);
     let half = |colour: usize| {
         let mut kept = whole.clone();
         let width = kept.width();
         for (at, height) in kept.data_mut().iter_mut().enumerate() {
-            if !has_colour(bounds, [at % width, at / width].map(|at| at.saturating_sub(RIM)), colour) {
+            if colour_of(bounds, [at % width, at / width].map(|at| at.saturating_sub(RIM))) != colour {
                 *height = f32::NAN;
             }
         }
@@ -260,8 +244,9 @@ fn sideways(
     };
     let halves = [half(0)?, half(1)?];
     let mut slopes = [0.0; 2];
-    for (row, next) in (1..whole.height()).map(|row| (row - 1, row)) {
-        let pairs = whole.row(row).iter().zip(&whole.row(row)[1..]).zip(whole.row(next));
+    for next in 1..whole.height() {
+        let row = whole.row(next - 1);
+        let pairs = row.iter().zip(&row[1..]).zip(whole.row(next));
         for ((height, right), below) in pairs {
             let steps = [right - height, below - height].map(f64::from);
             if steps.iter().all(|step| step.is_finite()) {
@@ -278,8 +263,7 @@ fn upwards(errors: &Grid<f32>, bounds: &[Range<usize>; 2]) -> Option<[Found; 1]>
     let mut halves: [Vec<f64>; 2] = Default::default();
     for row in bounds[1].clone() {
         for (column, error) in errors.row(row)[bounds[0].clone()].iter().enumerate().filter(|(_, e)| e.is_finite()) {
-            let colour = usize::from(!has_colour(bounds, [column, row - bounds[1].start], 0));
-            halves[colour].push(-f64::from(*error));
+            halves[colour_of(bounds, [column, row - bounds[1].start])].push(-f64::from(*error));
         }
     }
     let information = (halves[0].len() + halves[1].len()) as f64;
@@ -287,10 +271,10 @@ fn upwards(errors: &Grid<f32>, bounds: &[Range<usize>; 2]) -> Option<[Found; 1]>
     Some([Found { halves: [upper_median(first)?, upper_median(second)?], information }])
 }
 
-/// Returns whether the tile of a cell, counted from the corner of its block, has a colour.
-fn has_colour(bounds: &[Range<usize>; 2], cell: [usize; 2], colour: usize) -> bool {
+/// Returns the colour, 0 or 1, of the tile of a cell, counted from the corner of its block.
+fn colour_of(bounds: &[Range<usize>; 2], cell: [usize; 2]) -> usize {
     let tile = |axis: usize| cell[axis] * TILES / bounds[axis].len().max(1);
-    (tile(0) + tile(1)) % 2 == colour
+    (tile(0) + tile(1)) % 2
 }
 
 /// Blocks of a surface.
@@ -318,6 +302,7 @@ impl Blocks {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::alignment::resample::bilinear;
     use numeric::random::{hash64, unit_interval};
     use raster::GeoTransform;
 

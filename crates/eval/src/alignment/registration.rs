@@ -97,13 +97,13 @@ pub fn register_surfaces(
     let steps = around(&[start]);
     let (_, best) = finest.finest(&steps, &[start], POSITIONS);
     let cells = [best.columns, best.rows];
-    let mut errors = differences(test, reference, cells);
+    let mut errors = differences(test, reference, |_, _| cells);
     let offset = upper_median(&mut finite(&errors)).ok_or(EvalError::NoOverlap {
         reference_cells: reference.data().iter().filter(|height| height.is_finite()).count(),
     })?;
     errors.data_mut().iter_mut().for_each(|error| *error -= offset as f32);
     let nmad = |errors: &Grid<f32>| upper_nmad(&mut finite(errors)).unwrap_or(f64::NAN);
-    let nmad_m = (nmad(&differences(test, reference, [0.0; 2])), nmad(&errors));
+    let nmad_m = (nmad(&differences(test, reference, |_, _| [0.0; 2])), nmad(&errors));
     let (dx_m, dy_m) = metres_from_cells.apply(cells[0], cells[1]);
     Ok(Registration {
         shift: Shift { dx_m, dy_m, dz_m: -offset },
@@ -215,7 +215,7 @@ impl<'a> Parts<'a> {
             let inside = cut(self.errors, &bounds, [0; 2], 0);
             let up = upper_median(&mut finite(&inside))?;
             let reference = cut(reference, &bounds, [0; 2], RIM);
-            let test = cut(test, &grown(&bounds), moved.map(|cells| cells - RIM as isize), 0);
+            let test = cut(test, &grown(&bounds, RIM), moved.map(|cells| cells - RIM as isize), 0);
             let [columns, rows] = own_shift(&test, &reference, metres, PART_RADIUS_CELLS, Measure::Nmad)?;
             let (x, y) = metres.apply(columns, rows);
             Some([x, y, up])
@@ -251,13 +251,13 @@ fn standard_error(values: &[f64]) -> f64 {
 }
 
 /// Returns bounds that reach further by a rim to each side, counted from the rim's corner.
-fn grown(bounds: &[Range<usize>; 2]) -> [Range<usize>; 2] {
-    bounds.each_ref().map(|bound| bound.start..bound.end + 2 * RIM)
+pub(super) fn grown(bounds: &[Range<usize>; 2], rim: usize) -> [Range<usize>; 2] {
+    bounds.each_ref().map(|bound| bound.start..bound.end + 2 * rim)
 }
 
 /// Cuts the cells that lie `moved` columns and rows from a part out of a grid, and puts a rim
 /// without values around them.
-pub(crate) fn cut(grid: &Grid<f32>, [columns, rows]: &[Range<usize>; 2], moved: [isize; 2], rim: usize) -> Grid<f32> {
+pub(super) fn cut(grid: &Grid<f32>, [columns, rows]: &[Range<usize>; 2], moved: [isize; 2], rim: usize) -> Grid<f32> {
     let mut out = Grid::filled(columns.len() + 2 * rim, rows.len() + 2 * rim, f32::NAN);
     for (row, from) in rows.clone().enumerate() {
         let at =
@@ -269,13 +269,20 @@ pub(crate) fn cut(grid: &Grid<f32>, [columns, rows]: &[Range<usize>; 2], moved: 
     out
 }
 
-/// Returns test − reference, the test moved by some cells; NaN where either is void.
-pub(crate) fn differences(test: &Grid<f32>, reference: &Grid<f32>, [columns, rows]: [f64; 2]) -> Grid<f32> {
+/// Returns test − reference, the test moved by the columns and rows that `shift` gives for a column
+/// and a row; NaN where either is void.
+pub(super) fn differences(
+    test: &Grid<f32>,
+    reference: &Grid<f32>,
+    shift: impl Fn(f64, f64) -> [f64; 2] + Sync,
+) -> Grid<f32> {
     let mut out = Grid::filled(reference.width(), reference.height(), f32::NAN);
     let width = reference.width().max(1);
     out.data_mut().par_chunks_mut(width).enumerate().for_each(|(row, out)| {
         for ((column, out), height) in out.iter_mut().enumerate().zip(reference.row(row)) {
-            let moved = bilinear(test, column as f64 - columns, row as f64 - rows);
+            let (column, row) = (column as f64, row as f64);
+            let [columns, rows] = shift(column, row);
+            let moved = bilinear(test, column - columns, row - rows);
             *out = moved.map_or(f32::NAN, |moved| (moved - f64::from(*height)) as f32);
         }
     });
