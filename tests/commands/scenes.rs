@@ -7,6 +7,7 @@ mod priors;
 mod priors_satellite;
 mod priors_yardsticks;
 mod simulate;
+mod splat_labels;
 mod splats;
 mod split;
 mod train;

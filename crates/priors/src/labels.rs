@@ -7,6 +7,7 @@
 //! cloud larger than the tolerance has no label, however near its centre is.
 
 use camera::Similarity;
+use city::SurfaceClass;
 use gaussian::{Splat, SplatLabel};
 use rayon::prelude::*;
 
@@ -51,13 +52,16 @@ fn label(model: &PriorModel, splat: &Splat, to_mesh: &Similarity, tolerance_m: f
         return SplatLabel::NONE;
     }
     let surface = model.mesh().surface(triangle);
-    SplatLabel { class: surface.class as u8, object: surface.object.saturating_add(1) }
+    surface_label(surface.class, surface.object)
+}
+
+/// Returns the label of a surface of a class that belongs to the object of an index in its model.
+pub fn surface_label(class: SurfaceClass, object: u32) -> SplatLabel {
+    SplatLabel { class: class as u8, object: object.saturating_add(1) }
 }
 
 #[cfg(test)]
 mod tests {
-    use city::SurfaceClass;
-
     use super::*;
     use crate::model::tests::{cuboid, joined};
 

@@ -13,8 +13,8 @@
 //! - [`PriorMaps`] are the maps that a camera would measure of the model, [`SatelliteMaps`] the
 //!   maps of a satellite image.
 //! - [`initial_splats`] makes flat Gaussians to start a training with. [`splat_labels`] carries
-//!   class and object onto splats of any origin. [`Schedule`] holds the
-//!   weights of the priors during the training.
+//!   class and object onto splats of any origin. [`Schedule`] holds the weights of the priors
+//!   during the training.
 
 mod error;
 mod labels;
@@ -29,7 +29,7 @@ mod view;
 mod visibility;
 
 pub use error::PriorsError;
-pub use labels::splat_labels;
+pub use labels::{splat_labels, surface_label};
 pub use maps::{DepthKind, MISSING_CLASS, MapConfig, NO_OBJECT, NormalFrame, PriorMaps};
 pub use model::{PriorModel, buildings_of};
 pub use place::ModelPlace;

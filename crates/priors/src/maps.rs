@@ -12,7 +12,7 @@ use raster::Grid;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::{PriorModel, Rays, View};
+use crate::{PriorModel, Rays, View, surface_label};
 use numeric::vector::dot;
 
 /// Meaning of the depth.
@@ -150,12 +150,13 @@ impl Pixel {
             DepthKind::ZDepth => depth,
             DepthKind::RayLength => depth * dot(ray, ray).sqrt(),
         };
+        let SplatLabel { class, object } = surface_label(surface.class, surface.object);
         Some(Self {
             depth_m: depth as f32,
             // Adding zero turns −0 into 0, so that equal normals have equal bytes.
             normal: normal.map(|c| (turn * c) as f32 + 0.0),
-            class: surface.class as u8,
-            object: surface.object.saturating_add(1),
+            class,
+            object,
         })
     }
 }

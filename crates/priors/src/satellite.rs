@@ -11,11 +11,12 @@ mod lines;
 
 pub use lines::LinesOfSight;
 
+use gaussian::SplatLabel;
 use raster::Grid;
 use rayon::prelude::*;
 
 use crate::maps::{MISSING_CLASS, NO_OBJECT};
-use crate::{PriorModel, PriorsError};
+use crate::{PriorModel, PriorsError, surface_label};
 use numeric::vector::{along, dot, norm};
 
 /// Maps of a satellite image. All have its size.
@@ -105,13 +106,14 @@ impl Seen {
         let world = model.normal(triangle);
         let turn = if dot(world, ray.direction) > 0.0 { -1.0 } else { 1.0 };
         let height = along(ray.origin, hit.t, ray.direction)[2] + model.mesh().origin.z;
+        let SplatLabel { class, object } = surface_label(surface.class, surface.object);
         Some(Self {
             height_m: height as f32,
             distance_m: (hit.t * norm(ray.direction)) as f32,
             // Adding zero turns −0 into 0, so that equal normals have equal bytes.
             normal: lines.east_north_up(world).map(|c| (turn * c) as f32 + 0.0),
-            class: surface.class as u8,
-            object: surface.object.saturating_add(1),
+            class,
+            object,
         })
     }
 }

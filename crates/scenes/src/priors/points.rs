@@ -3,8 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use ::priors::{Sample, initial_splats};
-use gaussian::SplatLabel;
+use ::priors::{Sample, initial_splats, surface_label};
 use io::colmap::{self, ColmapEncoding, ColmapModel, ColmapObservation, ColmapPoint};
 use io::ply::{self, PlyPoint};
 use io::splat_ply::{self, LocalOrigin, SplatFile, SplatForm, SplatLayout};
@@ -69,8 +68,8 @@ fn kept(dataset: &Dataset<'_>) -> Vec<Sample> {
 fn write_splats(dataset: &Dataset<'_>, folder: &Path, kept: &[Sample]) -> Result<(), FileError> {
     let colours = kept.iter().map(|s| (s, colour(s.class).map(|c| f32::from(c) / 255.0)));
     let splats = initial_splats(colours);
-    let label = |s: &Sample| SplatLabel { class: s.class as u8, object: s.object.saturating_add(1) };
-    let labels = with_table(kept.iter().map(label).collect(), &dataset.file.model);
+    let labels = kept.iter().map(|s| surface_label(s.class, s.object)).collect();
+    let labels = with_table(labels, &dataset.file.model);
     let path = folder.join("splats");
     files::create_folder(&path)?;
     let moved = dataset.frame.moved_by().unwrap_or_default();
