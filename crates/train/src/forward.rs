@@ -114,17 +114,8 @@ pub(crate) fn draw<I: InstructionSet, const PERSPECTIVE: bool, const INVERSE: bo
         while left != 0 {
             let block = left.trailing_zeros() as usize % BLOCKS;
             left &= left - 1;
-            let (mut drawn, mut alive) = (0, false);
-            for part in 0..I::PARTS {
-                let sums = &mut out.sums[block];
-                let (pixels, is_alive) = if splat.is_wide {
-                    draw_block::<I, PERSPECTIVE, INVERSE, true>(isa, &brush, splat, block, part, sums)
-                } else {
-                    draw_block::<I, PERSPECTIVE, INVERSE, false>(isa, &brush, splat, block, part, sums)
-                };
-                drawn |= pixels;
-                alive |= is_alive;
-            }
+            let sums = &mut out.sums[block];
+            let (drawn, alive) = draw_block::<I, PERSPECTIVE, INVERSE>(isa, &brush, splat, block, sums);
             // A branch would be guessed wrong and known late.
             let is_drawn = drawn != 0;
             out.pixels[count] = drawn;
@@ -165,16 +156,7 @@ pub(crate) fn weigh<I: InstructionSet, const PERSPECTIVE: bool>(
             left &= left - 1;
             let sums = &mut sums[block];
             let before = sums.transmittance;
-            let (mut drawn, mut alive) = (0, false);
-            for part in 0..I::PARTS {
-                let (pixels, is_alive) = if splat.is_wide {
-                    draw_block::<I, PERSPECTIVE, false, true>(isa, &brush, splat, block, part, sums)
-                } else {
-                    draw_block::<I, PERSPECTIVE, false, false>(isa, &brush, splat, block, part, sums)
-                };
-                drawn |= pixels;
-                alive |= is_alive;
-            }
+            let (drawn, alive) = draw_block::<I, PERSPECTIVE, false>(isa, &brush, splat, block, sums);
             if drawn != 0 {
                 take(number, block, &before, &sums.transmittance);
             }
@@ -186,10 +168,32 @@ pub(crate) fn weigh<I: InstructionSet, const PERSPECTIVE: bool>(
     }
 }
 
+/// Draws a splat on a block. Returns at which pixels, and whether any pixel takes more splats.
+#[inline(always)]
+fn draw_block<I: InstructionSet, const PERSPECTIVE: bool, const INVERSE: bool>(
+    isa: I,
+    brush: &Brush<I::Lanes>,
+    splat: &ScreenSplat,
+    block: usize,
+    sums: &mut BlockSums,
+) -> (u16, bool) {
+    let (mut drawn, mut alive) = (0, false);
+    for part in 0..I::PARTS {
+        let (pixels, is_alive) = if splat.is_wide {
+            draw_part::<I, PERSPECTIVE, INVERSE, true>(isa, brush, splat, block, part, sums)
+        } else {
+            draw_part::<I, PERSPECTIVE, INVERSE, false>(isa, brush, splat, block, part, sums)
+        };
+        drawn |= pixels;
+        alive |= is_alive;
+    }
+    (drawn, alive)
+}
+
 /// Draws a splat on a part of a block. Returns at which pixels, and whether any pixel takes more
 /// splats.
 #[inline(always)]
-fn draw_block<I: InstructionSet, const PERSPECTIVE: bool, const INVERSE: bool, const WIDE: bool>(
+fn draw_part<I: InstructionSet, const PERSPECTIVE: bool, const INVERSE: bool, const WIDE: bool>(
     isa: I,
     brush: &Brush<I::Lanes>,
     splat: &ScreenSplat,
