@@ -1,5 +1,5 @@
-//! Class and object of a city model on splats: from priors, by `skysweep splats label`, in files and
-//! as maps.
+//! Class and object of a city model on splats: from priors, by `skysweep splats label`, in files
+//! and as maps.
 
 use std::path::Path;
 
