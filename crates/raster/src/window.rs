@@ -30,6 +30,14 @@ impl Window {
         (x1 > x0 && y1 > y0).then(|| Self { x: x0, y: y0, width: (x1 - x0) as usize, height: (y1 - y0) as usize })
     }
 
+    /// Returns the least window that holds two.
+    pub fn union(&self, other: &Self) -> Self {
+        let (x, y) = (self.x.min(other.x), self.y.min(other.y));
+        let x1 = end(self.x, self.width).max(end(other.x, other.width));
+        let y1 = end(self.y, self.height).max(end(other.y, other.height));
+        Self { x, y, width: x1.abs_diff(x) as usize, height: y1.abs_diff(y) as usize }
+    }
+
     /// Returns the window grown by `margin` pixels on every side.
     pub fn grown(&self, margin: usize) -> Self {
         let m = margin as i64;

@@ -8,7 +8,9 @@
 //!
 //! The heights of a chunk are found by a coarse sweep of it over all heights that the scene may
 //! have (see `probe`), towers included: a chunk in a plain does not pay for the mountains beside
-//! it. A chunk that would still take more memory than the run has is divided into quarters.
+//! it. Chunks narrower than their rim share the coarse sweep of a block of them, because each of
+//! their own sweeps would mostly be one of the rim. A chunk that would still take more memory than
+//! the run has is divided into quarters.
 
 use crs::MapProjection;
 use geo::Polygon;
@@ -26,7 +28,7 @@ use crate::images::image_pixels::read_coarse_view;
 use crate::images::image_windows::GroundBox;
 use crate::images::scene_image::SceneImage;
 use crate::memory;
-use crate::planning::chunk_side::{ALIGNED, MARGIN_PX, SIDE_MIN, aligned, needed_mb, quarters, with_rim};
+use crate::planning::chunk_side::{ALIGNED, MARGIN_PX, SIDE_MIN, aligned, blocks, needed_mb, quarters, with_rim};
 use crate::planning::grid::DsmGrid;
 use crate::planning::levels::{SweepLevels, choose_levels, smallest_sides};
 use crate::planning::probe;
@@ -140,22 +142,39 @@ enum Planned {
     TooLarge,
 }
 
+/// Result of the coarse sweep of a part of the grid.
+enum Probed {
+    Heights(HeightRange),
+    /// The images of the part take this much memory, megabytes: more than the run has.
+    TooLarge(u64),
+}
+
 impl ChunkPlanner<'_> {
     /// Plans the chunks of the given cores, in their order. Cores that take too much memory are
     /// divided into quarters. A chunk that cannot be planned stays void.
     ///
     /// # Errors
     /// The first error when no chunk can be planned, [`DsmError::Cancelled`].
-    pub(crate) fn chunks(&self, mut cores: Vec<Window>) -> Result<Vec<ChunkPlan>, DsmError> {
+    pub(crate) fn chunks(&self, cores: Vec<Window>) -> Result<Vec<ChunkPlan>, DsmError> {
         self.progress.begin("planning chunks", cores.len());
         let mut chunks = Vec::new();
         let mut first_error = None;
-        cores.reverse();
-        while let Some(core) = cores.pop() {
+        let blocks = blocks(self.grid, &cores);
+        let mut shared = vec![None; blocks.windows.len()];
+        let mut waiting: Vec<(Window, Option<usize>)> = cores.into_iter().zip(blocks.of_core).collect();
+        waiting.reverse();
+        while let Some((core, block)) = waiting.pop() {
             self.progress.check_cancelled()?;
-            let work = match self.plan(core) {
+            let known = match block {
+                None => None,
+                Some(block) => match shared[block] {
+                    Some(known) => known,
+                    None => *shared[block].insert(self.block_heights(blocks.windows[block])?),
+                },
+            };
+            let work = match self.plan(core, known) {
                 Ok(Planned::TooLarge) => {
-                    cores.extend(quarters(core).into_iter().rev());
+                    waiting.extend(quarters(core).into_iter().rev().map(|quarter| (quarter, None)));
                     continue;
                 }
                 Ok(Planned::Work(work)) => work,
@@ -176,29 +195,28 @@ impl ChunkPlanner<'_> {
         }
     }
 
-    fn plan(&self, core: Window) -> Result<Planned, DsmError> {
+    /// Plans a chunk. `known` are its heights where a block that holds it has been swept.
+    fn plan(&self, core: Window, known: Option<HeightRange>) -> Result<Planned, DsmError> {
         let extent = with_rim(self.grid, core);
         let grid = self.grid.part(extent);
-        let seen = self.seen(&grid)?;
-        let ChunkSources { all: sources, probing } = self.sources(&grid, &seen)?;
-        let seen = used(&sources);
+        let ChunkSources { all: sources, probing } = self.sources(&grid)?;
         if sources.iter().all(Vec::is_empty) {
             return Ok(Planned::Work(ChunkWork::Unseen));
         }
         let limit_mb = memory::limit_mb(self.config);
         let is_small = core.width.max(core.height) <= SIDE_MIN;
-        let wide = self.windows(&grid, self.wide_range(), &used(&probing))?;
-        let pixels: u64 = wide.iter().flatten().map(memory::area).fold(0, u64::saturating_add);
         let too_large = |needed_mb| {
             let error = DsmError::Memory { needed_mb, limit_mb };
             if is_small { Err(error) } else { Ok(Planned::TooLarge) }
         };
-        let coarse_mb = pixels.saturating_mul(BYTES_PER_COARSE_PIXEL) / 1_000_000;
-        if coarse_mb > limit_mb {
-            return too_large(coarse_mb);
-        }
-        let height_range = self.heights(&wide, probing)?;
-        let windows = self.windows(&grid, height_range, &seen)?;
+        let height_range = match known {
+            Some(known) => known,
+            None => match self.probed(&grid, probing)? {
+                Probed::Heights(range) => range,
+                Probed::TooLarge(coarse_mb) => return too_large(coarse_mb),
+            },
+        };
+        let windows = self.windows(&grid, height_range, &used(&sources))?;
         let needed_mb = needed_mb(&windows.iter().copied().flatten().collect::<Vec<_>>(), &grid);
         if needed_mb > limit_mb {
             return too_large(needed_mb);
@@ -207,6 +225,29 @@ impl ChunkPlanner<'_> {
         let levels = choose_levels(height_range, self.step_m, &sides, self.tuning);
         let sweep = ChunkSweep { extent, windows, sources, height_range, levels, needed_mb };
         Ok(Planned::Work(ChunkWork::Sweep(sweep)))
+    }
+
+    /// Returns the heights of a block of chunks; `None` where they cannot be found for all of it,
+    /// and each chunk has to find its own.
+    fn block_heights(&self, block: Window) -> Result<Option<HeightRange>, DsmError> {
+        let grid = self.grid.part(with_rim(self.grid, block));
+        let probed = self.sources(&grid).and_then(|sources| self.probed(&grid, sources.probing));
+        match probed {
+            Ok(Probed::Heights(range)) => Ok(Some(range)),
+            Err(DsmError::Cancelled) => Err(DsmError::Cancelled),
+            Ok(Probed::TooLarge(_)) | Err(_) => Ok(None),
+        }
+    }
+
+    /// Finds the heights of a part of the grid by a coarse sweep of the images that show it.
+    fn probed(&self, grid: &DsmGrid, probing: Vec<Vec<usize>>) -> Result<Probed, DsmError> {
+        let wide = self.windows(grid, self.wide_range(), &used(&probing))?;
+        let pixels: u64 = wide.iter().flatten().map(memory::area).fold(0, u64::saturating_add);
+        let coarse_mb = pixels.saturating_mul(BYTES_PER_COARSE_PIXEL) / 1_000_000;
+        if coarse_mb > memory::limit_mb(self.config) {
+            return Ok(Probed::TooLarge(coarse_mb));
+        }
+        Ok(Probed::Heights(self.heights(&wide, probing)?))
     }
 
     /// Returns which images may show the grid.
@@ -220,7 +261,8 @@ impl ChunkPlanner<'_> {
     }
 
     /// Chooses the images that are used over the grid, and the sources of each.
-    fn sources(&self, grid: &DsmGrid, seen: &[bool]) -> Result<ChunkSources, DsmError> {
+    fn sources(&self, grid: &DsmGrid) -> Result<ChunkSources, DsmError> {
+        let seen = self.seen(grid)?;
         let ground = GroundBox::new(grid, self.projection, self.range)?.outline(&self.geometry.frame);
         let part = |(seen, outline): (&bool, &Polygon<f64>)| {
             if *seen { shared_part(outline, &ground) } else { None }
@@ -257,7 +299,7 @@ impl ChunkPlanner<'_> {
         self.images.iter().zip(seen).map(one).collect()
     }
 
-    /// Returns the heights of a chunk, from a coarse sweep over all heights that the scene may
+    /// Returns the heights of windows, from a coarse sweep over all heights that the scene may
     /// have: those of the scene if all that was found lies among them, and otherwise those found.
     /// Where the scene's are so many that they take [`LEVELS_SAVED`] pyramid levels more, those
     /// found are used as well, because small things are lost on coarse levels.

@@ -3,6 +3,8 @@
 //! A chunk has a core, which is kept, and a rim of ground around it, as wide as what decides the
 //! content of a cell.
 
+use std::collections::HashMap;
+
 use raster::Window;
 
 use crate::config::DsmConfig;
@@ -102,6 +104,37 @@ pub(crate) fn cores(size: (usize, usize), side: usize) -> Vec<Window> {
     cuts(size.1).flat_map(|y| cuts(size.0).map(move |x| window(x, y))).collect()
 }
 
+/// Cores that share what is found for a block of them.
+pub(crate) struct Blocks {
+    /// Cells of each block: the least window that holds its cores.
+    pub(crate) windows: Vec<Window>,
+    /// Position of each core's block; `None` for a core that is as wide or high as its rim.
+    pub(crate) of_core: Vec<Option<usize>>,
+}
+
+/// Returns the blocks of cores that are narrower than their rim. A block is about four rims wide,
+/// so that it is swept with its rim at little more than twice the cost of its cells.
+pub(crate) fn blocks(grid: &DsmGrid, cores: &[Window]) -> Blocks {
+    let rim = rim(grid);
+    let mut windows: Vec<Window> = Vec::new();
+    let mut positions = HashMap::new();
+    let block_of = |core: &Window| {
+        if core.width.max(core.height) >= rim {
+            return None;
+        }
+        let along = |from: i64, length: usize| (from + length as i64 / 2) / (4 * rim) as i64;
+        let place = (along(core.x, core.width), along(core.y, core.height));
+        let position = *positions.entry(place).or_insert_with(|| {
+            windows.push(*core);
+            windows.len() - 1
+        });
+        windows[position] = windows[position].union(core);
+        Some(position)
+    };
+    let of_core = cores.iter().map(block_of).collect();
+    Blocks { windows, of_core }
+}
+
 /// Returns the quarters of a core.
 pub(crate) fn quarters(core: Window) -> Vec<Window> {
     let half = core.width.max(core.height).div_ceil(2);
@@ -121,6 +154,8 @@ pub(crate) fn aligned(w: Window) -> Window {
 
 #[cfg(test)]
 mod tests {
+    use raster::GeoTransform;
+
     use super::*;
 
     #[test]
@@ -137,6 +172,20 @@ mod tests {
             assert_eq!(parts.iter().map(|c| c.width * c.height).sum::<usize>(), cells);
             assert!(parts.iter().all(|p| cores.iter().filter(|c| c.intersection(p) == Some(*p)).count() == 1));
         }
+    }
+
+    #[test]
+    fn blocks_hold_their_cores_and_wide_cores_have_none() {
+        let geotransform = GeoTransform::north_up(500_000.0, 3_300_000.0, 0.5);
+        let grid = DsmGrid { epsg: 32617, geotransform, size: (3000, 2000), gsd_m: 0.5 };
+        let rim = rim(&grid);
+        let narrow = cores(grid.size, rim / 4);
+        let found = blocks(&grid, &narrow);
+        for (core, block) in narrow.iter().zip(&found.of_core) {
+            assert_eq!(found.windows[block.unwrap()].intersection(core), Some(*core));
+        }
+        assert!(found.windows.iter().all(|w| w.width.max(w.height) <= 5 * rim), "{:?}", found.windows);
+        assert!(blocks(&grid, &cores(grid.size, rim * 2)).of_core.iter().all(Option::is_none));
     }
 
     #[test]
