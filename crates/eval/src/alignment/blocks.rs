@@ -40,6 +40,13 @@ const LEAST_CLIP: f64 = 0.2;
 /// Median of the square of a normal deviate.
 const MEDIAN_SQUARE: f64 = 0.454_936;
 
+/// Returns the standard deviations along x and y, metres, of independent shifts along columns and
+/// rows, whose deviations are given in cells.
+fn deviations_on_map(metres: MetresFromCells, columns: f64, rows: f64) -> [f64; 2] {
+    let ((x_columns, y_columns), (x_rows, y_rows)) = (metres.apply(columns, 0.0), metres.apply(0.0, rows));
+    [x_columns.hypot(x_rows), y_columns.hypot(y_rows)]
+}
+
 /// A shift for each cell of a surface, to be added to it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LocalShifts {
@@ -49,8 +56,8 @@ pub struct LocalShifts {
     side: (f64, f64),
     /// Number of blocks that found a shift of their own; the others take the mean of all.
     pub found: usize,
-    /// Standard deviations of the true shifts between blocks along x, y and z, metres. 0 where
-    /// noise explains what was found.
+    /// Standard deviations of the true shifts between blocks along x, y and z, metres; shifts
+    /// along columns and rows count as independent. 0 where noise explains what was found.
     pub deviation_m: [f64; 3],
     /// Largest shift sideways and largest shift up or down, metres.
     pub largest_m: (f64, f64),
@@ -114,8 +121,8 @@ impl LocalShifts {
         for (shift, up) in local.shifts.data_mut().iter_mut().zip(upwards) {
             shift[2] = up;
         }
-        let (x, y) = metres.apply(deviation_columns, deviation_rows);
-        local.deviation_m = [x.abs(), y.abs(), deviation_z];
+        let [x, y] = deviations_on_map(metres, deviation_columns, deviation_rows);
+        local.deviation_m = [x, y, deviation_z];
         local.measure(metres);
         Ok(local)
     }
@@ -310,6 +317,17 @@ mod tests {
 
     fn metres() -> MetresFromCells {
         MetresFromCells::new(&GeoTransform::north_up(0.0, 0.0, 0.5), (1.0, 1.0))
+    }
+
+    /// Columns lead to the south-east and rows to the north-east, half a metre a cell.
+    #[test]
+    fn deviations_of_turned_cells_do_not_cancel() {
+        let half = 0.5 * 0.5f64.sqrt();
+        let turned = MetresFromCells::new(&GeoTransform([0.0, half, half, 0.0, -half, half]), (1.0, 1.0));
+        let [x, y] = deviations_on_map(turned, 2.0, 2.0);
+        assert!((x - 1.0).abs() < 1e-12 && (y - 1.0).abs() < 1e-12, "{x} {y}");
+        let [x, y] = deviations_on_map(turned, 2.0, 0.0);
+        assert!((x - 2.0 * half).abs() < 1e-12 && (y - 2.0 * half).abs() < 1e-12, "{x} {y}");
     }
 
     /// Hills between random heights on a lattice of 15 cells, with noise, moved by a shift that
