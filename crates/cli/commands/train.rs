@@ -83,7 +83,7 @@ pub(crate) struct Args {
     /// --splats, the buildings of a dataset that skysweep priors wrote, or else photographs].
     #[arg(long, value_parser = named(&PRESETS))]
     preset: Option<TrainPreset>,
-    /// Parts of the photographs that no splat of a point covers at the beginning, such as lawn.
+    /// What parts of the photographs begin with that no point lies in, such as lawn or gravel.
     #[arg(long, value_parser = named(&GAPS), default_value = "leave")]
     gaps: TrainGaps,
     /// Weight of a term of the loss that differs from the preset: absolute, squared (of colours),

@@ -31,7 +31,7 @@ pub enum PriorSchedule {
     Dataset,
 }
 
-/// What becomes of parts of the photographs that no splat of a point covers at the beginning.
+/// What becomes of parts of the photographs that no point lies in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum TrainGaps {
@@ -74,7 +74,7 @@ pub struct TrainConfig {
     /// What the training is for; what the dataset says when `None`: buildings where the priors job
     /// wrote it, or else photographs.
     pub preset: Option<TrainPreset>,
-    /// What becomes of parts of the photographs that no splat of a point covers at the beginning.
+    /// What becomes of parts of the photographs that no point lies in, such as lawn.
     pub gaps: TrainGaps,
     /// Weights of the loss that differ from those of the preset.
     pub weights: TrainWeights,
