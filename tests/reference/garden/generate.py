@@ -1,14 +1,14 @@
 """Writes reference.txt: what three cameras see of the points of shared/data/photos/garden3 as flat splats.
 
-Computed in f64 from the formulas of the papers alone, one splat after another: the ray of a pixel meets the plane of a
-splat through the homography of Huang et al. ("2D Gaussian Splatting", SIGGRAPH 2024, equations 4 to 10); the Gaussian is
-blurred in its plane by a variance of a tenth of a squared pixel (Younes and Boukhayma, "Anti-Aliased 2D Gaussian
-Splatting", 2025); colours are real spherical harmonics up to degree 3 whose coefficients beyond the constant are all 1;
-splats are blended from front to back as Kerbl et al. (2023) do.
+Computed in f64 from the formulas of the papers alone, one splat after another: the ray of a pixel meets the plane of
+a splat through the homography of Huang et al. ("2D Gaussian Splatting", SIGGRAPH 2024); the Gaussian is blurred in
+its plane by a variance of a tenth of a squared pixel (Younes and Boukhayma, "Anti-Aliased 2D Gaussian Splatting",
+2025); colours are real spherical harmonics up to degree 3 whose coefficients beyond the constant are all 1; splats
+are blended from front to back as Kerbl et al. (2023) do.
 
-A point is a splat whose shape follows from its number i, see `splats`. A line has the view, the first column and row of a
-block, its means of red, green, blue, coverage and the sum of weighted depths, then column, row, red, green and blue of a
-pixel in it at which no splat is about to begin or end. Needs NumPy; made with 2.5.3:
+A point is a splat whose shape follows from its number, see `splats`. A line has the view, the first column and row
+of a block, its means of red, green, blue, coverage and the sum of weighted depths, then column, row, red, green and
+blue of a pixel in it at which no splat is about to begin or end. Needs NumPy; made with 2.5.3:
 
     python generate.py ../../../../shared/data/photos/garden3/test_garden.npz > reference.txt
 """

@@ -7,12 +7,15 @@
 //! (RANSAC), and each block of a photograph that no point lies in gets a splat on the nearest plane
 //! along its ray that holds against the other photographs (as piecewise planar stereo, Sinha et al.
 //! 2009, chooses among planes). To hold, the place must lie within the reach of the plane's points,
-//! must not stand before what other photographs see, and must have its colour in one of them.
+//! must not stand before what other photographs see, and must have its colour in one of them. Where
+//! no plane does, the inverse depths of the nearest points in the photograph are interpolated; such
+//! a place must also lie among the depths of the points around it in another photograph.
 
 use ::train::{PinholeView, Surfel, SurfelCamera, TrainingView};
 use gaussian::quaternion_of_axes;
 use numeric::SplitMix64;
 use rstar::RTree;
+use rstar::primitives::GeomWithData;
 
 use super::initial::{OPACITY_LOGIT, SPREAD};
 
@@ -38,6 +41,8 @@ const SAME_COLOUR: f32 = 0.1;
 const LEAST_SINE: f64 = 0.05;
 /// Points of a plane whose distances from it are followed.
 const FOLLOWED: usize = 4;
+/// Blocks with points whose inverse depths are interpolated where no plane is known.
+const INTERPOLATED: usize = 8;
 
 type Point = [f64; 3];
 
@@ -148,22 +153,49 @@ struct Blocks {
     side: usize,
     /// Least depth of the points in each block, metres; infinite where there is none.
     nearest_m: Vec<f64>,
+    /// Inverse of these depths, per metre, at the first pixels of the blocks.
+    inverse: RTree<GeomWithData<[f64; 2], f64>>,
+}
+
+/// The inverse depths around a pixel, per metre.
+struct Around {
+    /// Interpolated: what is a plane in space has inverse depths that are linear in the image.
+    guess: f64,
+    least: f64,
+    greatest: f64,
 }
 
 impl Blocks {
-    fn new(camera: &PinholeView) -> Self {
+    fn new(camera: &PinholeView, places: impl Iterator<Item = Point>) -> Self {
         let size = camera.size;
         let side = (size[0].max(size[1]) / BLOCKS).max(LEAST_SIDE);
         let count = size.map(|s| s / side);
-        Self { count, side, nearest_m: vec![f64::INFINITY; count[0] * count[1]] }
-    }
-
-    fn add(&mut self, camera: &PinholeView, places: impl Iterator<Item = Point>) {
+        let nearest_m = vec![f64::INFINITY; count[0] * count[1]];
+        let mut blocks = Self { count, side, nearest_m, inverse: RTree::new() };
         for local in places.filter_map(|place| camera.local(0, place)) {
-            if let Some(block) = self.at(local.pixel) {
-                self.nearest_m[block] = self.nearest_m[block].min(local.depth_m);
+            if let Some(block) = blocks.at(local.pixel) {
+                blocks.nearest_m[block] = blocks.nearest_m[block].min(local.depth_m);
             }
         }
+        let known = blocks.nearest_m.iter().enumerate().filter(|(_, depth)| depth.is_finite());
+        let first = |block: usize| [block % count[0], block / count[0]].map(|c| (c * side) as f64);
+        let inverse = known.map(|(block, depth)| GeomWithData::new(first(block), 1.0 / depth)).collect();
+        blocks.inverse = RTree::bulk_load(inverse);
+        blocks
+    }
+
+    /// Returns the inverse depths of the nearest points in the image.
+    fn around(&self, pixel: [f64; 2]) -> Option<Around> {
+        let (mut sum, mut weights) = (0.0, 0.0);
+        let (mut least, mut greatest) = (f64::INFINITY, 0.0f64);
+        for near in self.inverse.nearest_neighbor_iter(&pixel).take(INTERPOLATED) {
+            let apart = [0, 1].map(|i| near.geom()[i] - pixel[i]);
+            let weight = 1.0 / apart[0].hypot(apart[1]).max(1.0);
+            sum += weight * near.data;
+            weights += weight;
+            (least, greatest) = (least.min(near.data), greatest.max(near.data));
+        }
+        (weights > 0.0).then(|| Around { guess: sum / weights, least, greatest })
     }
 
     /// Returns the number of the block of a pixel.
@@ -194,20 +226,15 @@ pub(super) fn fill(splats: &[Surfel], views: &[View], most: usize, seed: u64) ->
     spacings.sort_unstable_by(f64::total_cmp);
     let Some(&spacing) = spacings.get(spacings.len() / 2) else { return Vec::new() };
     let planes = planes(&points, spacing, &mut SplitMix64::new(seed));
-    let blocks = |view: &View| {
-        let mut blocks = Blocks::new(&view.camera);
-        blocks.add(&view.camera, points.iter().copied());
-        blocks
-    };
+    let blocks = |view: &View| Blocks::new(&view.camera, points.iter().copied());
     let scene = Scene { views, blocks: views.iter().map(blocks).collect(), planes, spacing };
     let mut made: Vec<Surfel> = Vec::new();
-    for view in 0..views.len() {
+    for (number, view) in views.iter().enumerate() {
         // What was filled for the photographs before is there by now.
-        let mut blocks = Blocks::new(&views[view].camera);
         let there = points.iter().copied().chain(made.iter().map(|s| s.position.map(f64::from)));
-        blocks.add(&views[view].camera, there);
+        let blocks = Blocks::new(&view.camera, there);
         let open = blocks.open();
-        made.extend(open.into_iter().filter_map(|first| scene.splat(view, first, blocks.side)));
+        made.extend(open.into_iter().filter_map(|first| scene.splat(number, first, blocks.side)));
     }
     made.truncate(most);
     made
@@ -238,25 +265,25 @@ impl Scene<'_> {
         let middle = (side as f64 - 1.0) / 2.0;
         let pixel = [left as f64 + middle, top as f64 + middle];
         let along = minus(camera.point(pixel, 1.0)?, camera.centre);
-        let mut places: Vec<(f64, Point, &Plane)> = self
-            .planes
-            .iter()
-            .filter_map(|plane| {
-                let place = plane.met(camera.centre, along)?;
-                Some((dot(minus(place, camera.centre), along), place, plane))
-            })
-            .collect();
-        places.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let (_, place, plane) = places.into_iter().find(|(_, place, _)| self.holds(view, *place, mean))?;
-        let depth = camera.local(0, place)?.depth_m;
         let sight = unit(along)?;
-        let across = unit(cross(plane.normal, sight)).or_else(|| unit(cross(plane.normal, camera.rotation[0])))?;
-        let away = cross(plane.normal, across);
+        let depth_of = |place: Point| dot(minus(place, camera.centre), sight);
+        let met = |plane: &Plane| Some((plane.met(camera.centre, along)?, plane.normal));
+        let mut places: Vec<(Point, Point)> = self.planes.iter().filter_map(met).collect();
+        places.sort_by(|a, b| depth_of(a.0).total_cmp(&depth_of(b.0)));
+        let on_plane = places.into_iter().find(|(place, _)| self.holds(view, *place, mean, false));
+        let (place, normal) = on_plane.or_else(|| {
+            // Where no plane is known, the surface lies between the points around it.
+            let place = camera.point(pixel, 1.0 / self.blocks[view].around(pixel)?.guess)?;
+            self.holds(view, place, mean, true).then(|| (place, sight.map(|c| -c)))
+        })?;
+        let depth = camera.local(0, place)?.depth_m;
+        let across = unit(cross(normal, sight)).or_else(|| unit(cross(normal, camera.rotation[1])))?;
+        let away = cross(normal, across);
         let width_m = side as f64 * depth / camera.focal_px[0];
-        let lengths = [width_m, width_m / dot(plane.normal, sight).abs().max(LEAST_SINE)];
+        let lengths = [width_m, width_m / dot(normal, sight).abs().max(LEAST_SINE)];
         Some(Surfel {
             position: place.map(|c| c as f32),
-            rotation: quaternion_of_axes([across, away, plane.normal]).map(|c| c as f32),
+            rotation: quaternion_of_axes([across, away, normal]).map(|c| c as f32),
             log_scale: lengths.map(|length| (SPREAD * length).ln() as f32),
             opacity_logit: OPACITY_LOGIT,
             colour: mean,
@@ -264,8 +291,9 @@ impl Scene<'_> {
     }
 
     /// Returns whether the views allow a surface of a colour at a place: most of those that know
-    /// points there have none behind it, and another than the given one has the colour.
-    fn holds(&self, view: usize, place: Point, colour: [f32; 3]) -> bool {
+    /// points there have none behind it, and another than the given one has the colour; where
+    /// `among` is set, that one also has to know it to lie among the depths of the points nearby.
+    fn holds(&self, view: usize, place: Point, colour: [f32; 3], among: bool) -> bool {
         let (mut before, mut known, mut is_seen) = (0, 0, false);
         for (number, (other, blocks)) in self.views.iter().zip(&self.blocks).enumerate() {
             let Some(local) = other.camera.local(0, place) else { continue };
@@ -277,7 +305,9 @@ impl Scene<'_> {
             before += usize::from(farther_m.is_finite() && farther_m > self.spacing);
             let is_hidden = farther_m < -self.spacing;
             let apart = |c: usize| (other.colour[c][pixel] - colour[c]).abs();
-            is_seen |= number != view && !is_hidden && (0..3).all(|c| apart(c) <= SAME_COLOUR);
+            let is_alike = number != view && !is_hidden && (0..3).all(|c| apart(c) <= SAME_COLOUR);
+            let is_among = |around: Around| (around.least..=around.greatest).contains(&(1.0 / local.depth_m));
+            is_seen |= is_alike && (!among || blocks.around(local.pixel).is_some_and(is_among));
         }
         is_seen && 2 * before <= known
     }
@@ -371,18 +401,14 @@ mod tests {
         // Points below the hole that both views see: nothing may stand before them.
         let views = [view([-2.0, 0.0, 12.0], 8.0), view([2.0, 0.0, 12.0], 8.0)];
         let holds = |points: &[Point]| {
-            let blocks = |view: &View| {
-                let mut blocks = Blocks::new(&view.camera);
-                blocks.add(&view.camera, points.iter().copied());
-                blocks
-            };
+            let blocks = |view: &View| Blocks::new(&view.camera, points.iter().copied());
             let scene = Scene {
                 views: &views,
                 blocks: views.iter().map(blocks).collect(),
                 planes: Vec::new(),
                 spacing: SPACING,
             };
-            scene.holds(0, [0.0; 3], tone(0.0, 0.0))
+            scene.holds(0, [0.0; 3], tone(0.0, 0.0), false)
         };
         let around: Vec<Point> = splats.iter().map(|s| s.position.map(f64::from)).collect();
         let below = |i: i32| [0.2 * f64::from(i % 9 - 4), 0.2 * f64::from(i / 9 - 4), -3.0];
