@@ -8,7 +8,7 @@ are blended from front to back as Kerbl et al. (2023) do.
 
 A point is a splat whose shape follows from its number, see `splats`. A line has the view, the first column and row
 of a block, its means of red, green, blue, coverage and the sum of weighted depths, then column, row, red, green and
-blue of a pixel in it at which no splat is about to begin or end. Needs NumPy; made with 2.5.3:
+blue of a pixel in it at which no splat is about to begin or end. Needs NumPy; made with 2.4.6:
 
     python generate.py ../../../../shared/data/photos/garden3/test_garden.npz > reference.txt
 """
