@@ -2,6 +2,7 @@
 
 mod align;
 mod city;
+mod garden;
 mod mesh;
 mod priors;
 mod priors_satellite;

@@ -12,9 +12,9 @@ use super::dataset::TrainData;
 /// Neighbours whose mean distance is the spacing of the points.
 const NEIGHBOURS: usize = 3;
 /// Standard deviation of a splat in spacings, so that neighbours overlap.
-const SPREAD: f64 = 0.6;
+pub(super) const SPREAD: f64 = 0.6;
 /// Logit of the opacity at the beginning: one half.
-const OPACITY_LOGIT: f32 = 0.0;
+pub(super) const OPACITY_LOGIT: f32 = 0.0;
 
 /// Returns at most `most` splats.
 pub(super) fn surfels(data: &TrainData, most: usize) -> Vec<Surfel> {
