@@ -14,10 +14,10 @@ from scipy import ndimage
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
 NODATA = -32768.0
-# The manual asks for a window as wide as the widest object, and its default of 11 cells is narrower than a house.
+# Wider than the widest object of the places; its default of 11 cells is narrower than a house.
 WHITEBOX_WINDOW_M = 90.5
 SETTINGS = {
-    "whitebox-workflows": f"a window of {WHITEBOX_WINDOW_M} m as its manual asks for (the default is 11 cells), default slope of 15°",
+    "whitebox-workflows": f"a window of {WHITEBOX_WINDOW_M} m, wider than any building here (its default of 11 cells is narrower than a house), default slope of 15°",
     "CSF": "defaults (cloth 1 m, rigidness 3, threshold 0.5 m, 500 rounds, slopes smoothed)",
     "bulldozer-dtm": "defaults (objects up to 16 m, slopes up to 20 %)",
     "dsm2dtm": "defaults (radius 40 m, slope from the surface)",
