@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail, ensure};
 use jobs::train::{
-    PriorSchedule, SatelliteTrainConfig, TrainConfig, TrainGaps, TrainNumbers, TrainPreset, TrainPriors, TrainSchedule,
+    PriorSchedule, SatelliteTrainConfig, TrainConfig, TrainNumbers, TrainPreset, TrainPriors, TrainSchedule,
     TrainSteps, TrainWeights,
 };
 
@@ -83,9 +83,6 @@ pub(crate) struct Args {
     /// --splats, the buildings of a dataset that skysweep priors wrote, or else photographs].
     #[arg(long, value_parser = named(&PRESETS))]
     preset: Option<TrainPreset>,
-    /// What parts of the photographs begin with that no point lies in, such as lawn or gravel.
-    #[arg(long, value_parser = named(&GAPS), default_value = "leave")]
-    gaps: TrainGaps,
     /// Weight of a term of the loss that differs from the preset: absolute, squared (of colours),
     /// similarity (D-SSIM), mask, distortion (of inverse depths, in sizes of the scene),
     /// consistency (of normals), prior-depth (in sizes of the scene), prior-normal, correlation.
@@ -134,11 +131,6 @@ const PRESETS: [Named<TrainPreset>; 4] = [
     ("building-only", TrainPreset::BuildingOnly, "nothing but buildings, with priors (GS4Buildings)"),
     ("building-enhanced", TrainPreset::BuildingEnhanced, "the scene, with priors of its buildings (GS4Buildings)"),
     ("satellite", TrainPreset::Satellite, "satellite images with the heights of a surface model"),
-];
-
-const GAPS: [Named<TrainGaps>; 2] = [
-    ("fill", TrainGaps::Fill, "splats on the planes of the points nearby, where other photographs agree"),
-    ("leave", TrainGaps::Leave, "empty"),
 ];
 
 const PRIOR_SCHEDULES: [Named<PriorSchedule>; 2] = [
@@ -191,7 +183,6 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
     config.hold_out = args.hold_out;
     config.hold_out_names.clone_from(&args.hold_out_view);
     config.preset = args.preset;
-    config.gaps = args.gaps;
     (config.weights, config.steps, config.schedule) = numbers(args)?;
     config.priors = args.priors;
     config.prior_schedule = args.prior_schedule;
@@ -214,7 +205,6 @@ fn on_images(args: &Args, splats: &Path, global: Global) -> anyhow::Result<Outco
         ("--masks", args.masks.is_some()),
         ("--points", args.points.is_some()),
         ("--shrink", args.shrink != 1),
-        ("--gaps", args.gaps != TrainGaps::Leave),
     ];
     if let Some((option, _)) = given.iter().find(|(_, given)| *given) {
         bail!("{option} is for datasets, and --splats for satellite images: leave one of them out");

@@ -215,6 +215,28 @@ fn masked_pixels_take_no_part() {
     refused("the mask of flight_03.png is 0 everywhere");
 }
 
+/// What a photograph shows that is held out to judge the result changes no splat.
+#[test]
+fn held_out_photographs_are_not_learned_from() {
+    let out = tempfile::tempdir().unwrap();
+    let pictures = out.path().join("pictures");
+    std::fs::create_dir(&pictures).unwrap();
+    for entry in std::fs::read_dir(dataset().join("images")).unwrap().map(Result::unwrap) {
+        std::fs::copy(entry.path(), pictures.join(entry.file_name())).unwrap();
+    }
+    let splats = |name: &str| {
+        let output = out.path().join(name);
+        let held_out = ["--hold-out-view", "flight_04.png", "--pictures", pictures.to_str().unwrap()];
+        train(&output, &[&["--iterations", "2"][..], &held_out].concat()).success();
+        std::fs::read(output.join("splats.ply")).unwrap()
+    };
+    let first = splats("first");
+    let size = io::colmap::read(&dataset().join("sparse/0")).unwrap().lenses[0].clone();
+    let black = Grid::filled(size.width(), size.height(), [0u8; 3]);
+    write_png_rgb(pictures.join("flight_04.png"), &black, true).unwrap();
+    assert!(splats("second") == first, "the splats depend on a photograph that is held out");
+}
+
 /// Cameras of a transforms.json begin with random points, or with those of a model.
 #[test]
 fn transforms_are_trained_on() {

@@ -2045,7 +2045,6 @@ def train(
     hold_out: int = 8,
     hold_out_names: Sequence[str] = (),
     preset: Literal["photographs", "building-only", "building-enhanced", "satellite"] | None = None,
-    gaps: Literal["fill", "leave"] = "leave",
     weights: TrainWeights | None = None,
     steps: TrainSteps | None = None,
     prior_schedule: Literal["preset", "dataset"] = "dataset",
@@ -2080,7 +2079,6 @@ def train(
         hold_out_names: Names of the views that are kept instead, where there are any.
         preset: What the training is for; what the dataset says when `None`: buildings where the
             priors job wrote it, or else photographs.
-        gaps: What becomes of parts of the photographs that no point lies in, such as lawn.
         weights: Weights of the loss that differ from those of the preset.
         steps: Steps of the optimiser that differ from those of the preset.
         prior_schedule: Where the factors of the priors by iteration come from.

@@ -4558,9 +4558,6 @@ class TrainConfig(Report):
     """What the training is for; what the dataset says when `None`: buildings where the priors
     job wrote it, or else photographs."""
 
-    gaps: Literal["fill", "leave"]
-    """What becomes of parts of the photographs that no point lies in, such as lawn."""
-
     weights: TrainWeights
     """Weights of the loss that differ from those of the preset."""
 
@@ -4621,9 +4618,6 @@ class TrainReport(Report):
 
     splats_before: int
     """Number of splats at the beginning."""
-
-    splats_in_gaps: int
-    """Number of these in gaps between points."""
 
     splats_after: int
     """Number of splats at the end."""

@@ -31,16 +31,6 @@ pub enum PriorSchedule {
     Dataset,
 }
 
-/// What becomes of parts of the photographs that no point lies in.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum TrainGaps {
-    /// They get splats on the planes of the points nearby, where other photographs agree.
-    Fill,
-    /// They begin empty.
-    Leave,
-}
-
 /// A training of splats on a dataset.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -74,8 +64,6 @@ pub struct TrainConfig {
     /// What the training is for; what the dataset says when `None`: buildings where the priors job
     /// wrote it, or else photographs.
     pub preset: Option<TrainPreset>,
-    /// What becomes of parts of the photographs that no point lies in, such as lawn.
-    pub gaps: TrainGaps,
     /// Weights of the loss that differ from those of the preset.
     pub weights: TrainWeights,
     /// Steps of the optimiser that differ from those of the preset.
@@ -117,7 +105,6 @@ impl TrainConfig {
             hold_out: 8,
             hold_out_names: Vec::new(),
             preset: None,
-            gaps: TrainGaps::Leave,
             weights: TrainWeights::default(),
             steps: TrainSteps::default(),
             prior_schedule: PriorSchedule::Dataset,

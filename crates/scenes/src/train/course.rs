@@ -8,7 +8,7 @@ use numeric::Progress;
 
 use super::checkpoint::Checkpoint;
 use super::error::TrainError;
-use super::iterate::Iterations;
+use super::iterate::{Iterations, extent_m};
 use super::report::LossPoint;
 use super::results::CHECKPOINT;
 use super::transients::find_transients;
@@ -28,8 +28,6 @@ pub(super) struct Course<'a> {
     pub(super) transients: bool,
     /// Number of the first views that have pictures.
     pub(super) pictures: usize,
-    /// Size of the scene, metres.
-    pub(super) extent_m: f64,
     /// The settings of the trainer.
     pub(super) settings: TrainingConfig,
 }
@@ -53,6 +51,7 @@ impl Course<'_> {
         mut views: Vec<TrainingView<C>>,
         progress: &dyn Progress,
     ) -> Result<Trained, TrainError> {
+        let extent_m = extent_m(initial);
         let checkpoint = self.output.join(CHECKPOINT);
         let Checkpoint { mut state, left_out } = match self.resume && checkpoint.is_file() {
             true => Checkpoint::read(&checkpoint, &views, self.pictures)?,
@@ -61,7 +60,7 @@ impl Course<'_> {
         let mut run = Iterations::new(self.settings.iterations, state.iteration, progress);
         let masks = if self.transients && left_out.is_empty() {
             let last = (TRANSIENTS_AT * f64::from(self.settings.iterations)) as u32;
-            let mut trainer = Trainer::new(&views, self.extent_m, state, self.settings);
+            let mut trainer = Trainer::new(&views, extent_m, state, self.settings);
             run.until(&mut trainer, last, |state, stopped| self.keep(state, &[], stopped))?;
             state = trainer.into_state();
             find_transients(&state, &views[..self.pictures])
@@ -73,7 +72,7 @@ impl Course<'_> {
                 plane.iter_mut().zip(mask).filter(|(_, left_out)| **left_out).for_each(|(value, _)| *value = f32::NAN);
             }
         }
-        let mut trainer = Trainer::new(&views, self.extent_m, state, self.settings);
+        let mut trainer = Trainer::new(&views, extent_m, state, self.settings);
         run.until(&mut trainer, u32::MAX, |state, stopped| self.keep(state, &masks, stopped))?;
         let state = trainer.into_state();
         // Writing the results may be stopped, too. They are made again from here.

@@ -1,5 +1,5 @@
 //! The splats that a training begins with: points of the dataset, coloured and turned as the views
-//! that see them say.
+//! that see them say. Views that are held out say nothing.
 
 use ::train::{Surfel, SurfelCamera};
 use gaussian::quaternion_of_axes;
@@ -12,9 +12,9 @@ use super::dataset::TrainData;
 /// Neighbours whose mean distance is the spacing of the points.
 const NEIGHBOURS: usize = 3;
 /// Standard deviation of a splat in spacings, so that neighbours overlap.
-pub(super) const SPREAD: f64 = 0.6;
+const SPREAD: f64 = 0.6;
 /// Logit of the opacity at the beginning: one half.
-pub(super) const OPACITY_LOGIT: f32 = 0.0;
+const OPACITY_LOGIT: f32 = 0.0;
 
 /// Returns at most `most` splats.
 pub(super) fn surfels(data: &TrainData, most: usize) -> Vec<Surfel> {
@@ -43,8 +43,8 @@ fn spacing(tree: &RTree<GeomWithData<[f64; 3], usize>>, position: [f64; 3]) -> f
 
 fn surfel(data: &TrainData, point: &ColmapPoint, spacing: f64) -> Surfel {
     let (mut colour, mut normal, mut seen) = ([0.0f32; 3], [0.0f64; 3], 0.0f32);
-    for view in point.track.iter().filter_map(|o| data.view_of.get(o.view as usize).copied().flatten()) {
-        let view = &data.views[view];
+    let seeing = point.track.iter().filter_map(|o| data.view_of.get(o.view as usize).copied().flatten());
+    for view in seeing.filter(|view| !data.held_out[*view]).map(|view| &data.views[view]) {
         let Some(local) = view.camera.local(0, point.position) else { continue };
         let [width, height] = view.camera.size;
         let [x, y] = local.pixel.map(f64::round);

@@ -19,7 +19,6 @@ mod course;
 mod dataset;
 mod error;
 mod exposure;
-mod gaps;
 mod held_out;
 mod initial;
 mod iterate;
@@ -37,7 +36,7 @@ mod transients;
 
 pub(crate) use place::DatasetPlace;
 
-pub use config::{PriorSchedule, TrainConfig, TrainGaps, TrainPriors};
+pub use config::{PriorSchedule, TrainConfig, TrainPriors};
 pub use error::TrainError;
 pub use recipe::{TrainNumbers, TrainPreset, TrainSchedule, TrainSteps, TrainWeights};
 pub use report::{LossPoint, TrainReport, TrainedViewRow};

@@ -23,8 +23,6 @@ pub struct TrainReport {
     pub harmonics_degree: u8,
     /// Number of splats at the beginning.
     pub splats_before: usize,
-    /// Number of these in gaps between points.
-    pub splats_in_gaps: usize,
     /// Number of splats at the end.
     pub splats_after: usize,
     /// Whether only what the masks show is modelled.

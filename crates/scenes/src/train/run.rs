@@ -9,14 +9,12 @@ use raster::Grid;
 use report::Comparison;
 use splats::{ms_ssim, psnr_db, ssim};
 
-use super::config::{PriorSchedule, TrainConfig, TrainGaps};
+use super::config::{PriorSchedule, TrainConfig};
 use super::course::{Course, Trained};
 use super::dataset::TrainData;
 use super::error::TrainError;
 use super::exposure::right_half;
-use super::gaps;
 use super::initial;
-use super::iterate::extent_m;
 use super::page;
 use super::recipe::{self, TrainPreset};
 use super::report::{Exposed, Quality, TrainReport, TrainedViewRow};
@@ -57,12 +55,7 @@ fn train(
         return Err(TrainError::NoPoints { count: data.points.len(), path: data.sparse.clone() });
     }
     let (preset, settings) = settings(config, data);
-    let mut initial = initial::surfels(data, config.budget / 2);
-    let (points, extent_m) = (initial.len(), extent_m(&initial));
-    if config.gaps == TrainGaps::Fill {
-        let room = (config.budget / 2).saturating_sub(points);
-        initial.extend(gaps::fill(&initial, &views, room, config.seed));
-    }
+    let initial = initial::surfels(data, config.budget / 2);
     let before = quality(data, &TrainingState::new(initial.clone(), 0), None)?.views;
     let course = Course {
         output: &config.output,
@@ -70,7 +63,6 @@ fn train(
         resume: config.resume,
         transients: config.transients,
         pictures: views.len(),
-        extent_m,
         settings,
     };
     let Trained { state, transient_share, losses, seconds } = course.run(&initial, views, progress)?;
@@ -89,7 +81,6 @@ fn train(
         splats,
         harmonics_degree: state.harmonics.degree(),
         splats_before: initial.len(),
-        splats_in_gaps: initial.len() - points,
         splats_after: state.surfels.len(),
         masked: data.masked,
         depth_scale: state.depth_scale,

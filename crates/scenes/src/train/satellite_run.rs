@@ -226,15 +226,13 @@ fn train(
     let pictures: Vec<&SatelliteImage> = images.iter().chain(&judged).collect();
     let begun = TrainingState::new(placed.surfels.clone(), 0);
     let before: Vec<Quality> = pictures.iter().map(|image| quality(&begun, &image.view).0).collect();
-    let extent_m = extent_m(&placed.surfels);
     let course = Course {
         output: &config.output,
         checkpoint_every: config.checkpoint_every,
         resume: config.resume,
         transients: config.transients,
         pictures: images.len(),
-        extent_m,
-        settings: settings(config, extent_m),
+        settings: settings(config, extent_m(&placed.surfels)),
     };
     let Trained { state, transient_share, losses, seconds } = course.run(&placed.surfels, views, progress)?;
     results::begin(&folder)?;
