@@ -282,7 +282,8 @@ class _Course:
         self.waits: dict[int, int] = {}
         self.later: list[tuple[float, int]] = []
         self.number: dict[Any, int] = {}
-        self.running = as_completed([])
+        # Results are fetched as they come, many at a time, and not one by one from as many workers.
+        self.running = as_completed([], with_results=True, raise_errors=False)
 
     def send(self, chunks: Sequence[int], claims: Mapping[str, float]) -> None:
         stamp = f"{self.plan.id[:12]}-{time.time_ns()}"
@@ -315,11 +316,11 @@ class _Course:
             if not (self.number and self.running.has_ready()):
                 time.sleep(_LOOK_S)
                 continue
-            future = next(self.running)
+            future, result = next(self.running)
             chunk = self.number.pop(future)
             error = future.exception() if future.status in ("error", "cancelled", "lost") else None
             if future.status == "finished":
-                self.ended(chunk, future.result(), watching)
+                self.ended(chunk, result, watching)
             elif isinstance(error, InputError):
                 raise error
             elif self.again.get(chunk, 0) < self.retries:
