@@ -45,22 +45,22 @@ mod tests {
     use super::super::lanes::{Block, InstructionSet, Lanes, exp2};
     use super::*;
 
-    /// The bits of every operation.
-    struct All;
+    /// The bits of every operation on some numbers.
+    #[derive(Clone, Copy)]
+    struct All<'a>(&'a [Block; 16]);
 
-    impl Kernel for All {
+    impl Kernel for All<'_> {
         type Output = Vec<u32>;
 
         #[inline(always)]
         fn run<I: InstructionSet>(self, isa: I) -> Vec<u32> {
-            let blocks: [Block; 16] =
-                std::array::from_fn(|k| Block(std::array::from_fn(|i| ((k * 16 + i) as f32).sin() * 3.0)));
+            let blocks = self.0;
             let (mut kept, mut totals) = ([Block::ZERO; 16], [0.0; 16]);
             let mut results = [Block::ZERO; 12];
             let (mut marked, mut again) = (0, 0);
             for part in 0..I::PARTS {
                 let mut lanes = [isa.splat(0.0); 16];
-                for (lanes, block) in lanes.iter_mut().zip(&blocks) {
+                for (lanes, block) in lanes.iter_mut().zip(blocks) {
                     *lanes = isa.load(block, part);
                 }
                 totals = isa.totals(lanes, part, &mut kept);
@@ -95,9 +95,11 @@ mod tests {
 
     #[test]
     fn registers_of_every_length_give_the_bits_of_plain_code() {
-        let plain = dispatch(Registers::Plain, All);
-        assert_eq!(dispatch(Registers::AtMost256, All), plain);
-        assert_eq!(dispatch(Registers::Longest, All), plain);
+        // Made once: a sine that the compiler knows can differ in its last bit from one of a library.
+        let all = All(&std::array::from_fn(|k| Block(std::array::from_fn(|i| ((k * 16 + i) as f32).sin() * 3.0))));
+        let plain = dispatch(Registers::Plain, all);
+        assert_eq!(dispatch(Registers::AtMost256, all), plain);
+        assert_eq!(dispatch(Registers::Longest, all), plain);
     }
 
     struct Exp2(f32);
