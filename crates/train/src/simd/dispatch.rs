@@ -95,7 +95,7 @@ mod tests {
 
     #[test]
     fn registers_of_every_length_give_the_bits_of_plain_code() {
-        // Made once: a sine that the compiler knows can differ in its last bit from one of a library.
+        // Made once: a sine that the compiler works out may differ from the library's in a bit.
         let all = All(&std::array::from_fn(|k| Block(std::array::from_fn(|i| ((k * 16 + i) as f32).sin() * 3.0))));
         let plain = dispatch(Registers::Plain, all);
         assert_eq!(dispatch(Registers::AtMost256, all), plain);
