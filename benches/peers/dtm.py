@@ -29,13 +29,15 @@ BUILDING, GROUND = 6, 2
 HEIGHT_MAX_M = 1e5
 
 
-def environment(folder):
-    """Returns a python with the other programs, made when there is none."""
+def environment(folder, packages):
+    """Returns a python with packages, made when there is none."""
     python = folder / "venv/bin/python"
     if not python.exists():
         subprocess.run([sys.executable, "-m", "venv", folder / "venv"], check=True)
-        for package in PACKAGES:  # One by one: what cannot be installed is named in the table.
+    if not (folder / "venv/installed").exists():
+        for package in packages:  # One by one: what cannot be installed is named in the table.
             subprocess.run([python, "-m", "pip", "install", "--quiet", package])
+        (folder / "venv/installed").touch()
     return python
 
 
@@ -269,7 +271,7 @@ def main():
     if options.peer:
         RUNS[options.peer[0]](*map(pathlib.Path, options.peer[1:]))
         return
-    python = environment(options.work)
+    python = environment(options.work, PACKAGES)
     if pathlib.Path(sys.executable).resolve() != python.resolve() or sys.prefix == sys.base_prefix:
         os.execv(python, [str(python), __file__, *sys.argv[1:]])
     place = ROOT / "benches/results"

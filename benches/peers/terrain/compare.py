@@ -15,24 +15,13 @@ import resource
 import subprocess
 import sys
 
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[1]))
+import dtm  # noqa: E402
+
 ROOT = pathlib.Path(__file__).resolve().parents[3]
-PACKAGES = ["numpy", "scipy", "rasterio", "pyproj", "whitebox-workflows==2.0.6", "dsm2dtm==0.4.0",
-            "cloth-simulation-filter==1.1.7", "bulldozer-dtm==1.3.1"]
 OURS, HEIGHTS_ONLY = "skysweep", "skysweep, heights only"
 # Stated before any of them was made.
 SEEDS = list(range(9801, 9811))
-
-
-def environment(folder):
-    """Returns a python with the other programs, made when there is none."""
-    python = folder / "venv/bin/python"
-    if not python.exists():
-        subprocess.run([sys.executable, "-m", "venv", folder / "venv"], check=True)
-    if not (folder / "venv/installed").exists():
-        for package in PACKAGES:  # One by one: what cannot be installed is named in the table.
-            subprocess.run([python, "-m", "pip", "install", "--quiet", package])
-        (folder / "venv/installed").touch()
-    return python
 
 
 def timed(command):
@@ -70,7 +59,7 @@ def main():
     parser.add_argument("--seeds", type=int, nargs="*", default=SEEDS)
     parser.add_argument("--draft", action="store_true", help="write no results")
     options = parser.parse_args()
-    python = environment(options.work)
+    python = dtm.environment(options.work, [*dtm.PACKAGES, "pyproj"])
     if pathlib.Path(sys.prefix).resolve() != (options.work / "venv").resolve():
         os.execv(python, [str(python), __file__, *sys.argv[1:]])
     measure(options)

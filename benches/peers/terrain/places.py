@@ -111,7 +111,7 @@ class FromImages(Place):
     """A surface made of images, placed on a truth by a shift of whole cells and the median."""
 
     def __init__(self, name, run, top, like, folder):
-        heights, profile = programs.read(run / "dsm/dsm.tif")
+        heights, profile = dtm.read(run / "dsm/dsm.tif")
         super().__init__(name, run, heights, profile, folder)
         self.top, self.like = top, like
         surface = dtm.on_grid(run / "dsm/dsm.tif", like)
@@ -140,9 +140,9 @@ class Scene(FromImages):
 
     def __init__(self, program, seed, work):
         scene = made_scene(program, seed, work)
-        top, like = programs.read(scene / "truth_dsm.tif")
+        top, like = dtm.read(scene / "truth_dsm.tif")
         super().__init__(f"random:{seed}", scene / "run", top, like, work / f"made/r{seed}")
-        self.ground = programs.read(scene / "truth_ground.tif")[0]
+        self.ground = dtm.read(scene / "truth_ground.tif")[0]
         with rasterio.open(scene / "truth_buildings.tif") as file:
             self.kinds = file.read(1)
 
@@ -159,9 +159,9 @@ class Images(FromImages):
         run = work / f"scenes/{name}/run"
         if not (run / "report/report.json").exists():
             make_surface(program, views, run)
-        top, like = programs.read(lidar[0])
+        top, like = dtm.read(lidar[0])
         super().__init__(f"{name}, {len(views)} images", run, top, like, work / f"made/{name}_images")
-        self.kinds = programs.read(lidar[1])[0]
+        self.kinds = dtm.read(lidar[1])[0]
 
     def judged(self, path):
         found = self.on_truth(path)
@@ -174,14 +174,14 @@ class Lidar(Place):
     """A raster of LiDAR with classes, and the ground where there is one."""
 
     def __init__(self, name, files, work):
-        heights, profile = programs.read(files[0])
+        heights, profile = dtm.read(files[0])
         super().__init__(f"{name}, LiDAR", None, heights, profile, work / f"made/{name}")
-        self.top, self.kinds = heights, programs.read(files[1])[0]
-        self.ground = programs.read(files[2])[0] if len(files) > 2 else heights
+        self.top, self.kinds = heights, dtm.read(files[1])[0]
+        self.ground = dtm.read(files[2])[0] if len(files) > 2 else heights
         self.ours = files[0]
 
     def judged(self, path):
-        found = programs.read(path)[0]
+        found = dtm.read(path)[0]
         known = np.isfinite(self.ground) & np.isfinite(self.top)
         return scores(found - self.ground, found - self.top, known & (self.kinds == GROUND), known & (self.kinds == BUILDING))
 
@@ -206,7 +206,7 @@ class Points(Place):
         self.ours = self.cells
 
     def judged(self, path):
-        ground = programs.read(path)[0]
+        ground = dtm.read(path)[0]
         places = [(self.north - self.y) / self.cell_m - 0.5, (self.x - self.west) / self.cell_m - 0.5]
         void = 1e4
         found = ndimage.map_coordinates(np.where(np.isfinite(ground), ground, void), places, order=1, mode="nearest")

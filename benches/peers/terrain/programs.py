@@ -4,7 +4,6 @@ usage: programs.py NAME CELLS FILLED OUT
 
 CELLS is the surface with its voids, for programs that take points; FILLED the same surface without voids, for programs that take rasters.
 """
-import os
 import pathlib
 import sys
 
@@ -12,6 +11,9 @@ import numpy as np
 import rasterio
 from scipy import ndimage
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
+
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[1]))
+import dtm  # noqa: E402
 
 NODATA = -32768.0
 # Wider than the widest object of the places; its default of 11 cells is narrower than a house.
@@ -23,14 +25,6 @@ SETTINGS = {
     "dsm2dtm": "defaults (radius 40 m, slope from the surface)",
     "SMRF": "PDAL's formula and defaults, rebuilt in Python (cell 1 m, slope 0.15, window 18 m, threshold 0.5 m, scalar 1.25)",
 }
-
-
-def read(path):
-    with rasterio.open(path) as file:
-        heights = file.read(1).astype("float64")
-        if file.nodata is not None:
-            heights[heights == file.nodata] = np.nan
-        return heights, file.profile
 
 
 def write(path, heights, profile):
@@ -58,13 +52,13 @@ def interpolated(heights):
 def whitebox(_, filled, out):
     import whitebox_workflows
     tools = whitebox_workflows.WbEnvironment()
-    cells = int(WHITEBOX_WINDOW_M / read(filled)[1]["transform"].a) // 2 * 2 + 1
+    cells = int(WHITEBOX_WINDOW_M / dtm.read(filled)[1]["transform"].a) // 2 * 2 + 1
     tools.write_raster(tools.remove_off_terrain_objects(tools.read_raster(str(filled)), filter_size=cells), str(out))
 
 
 def csf(cells, _, out):
     import CSF
-    heights, profile = read(cells)
+    heights, profile = dtm.read(cells)
     rows, columns = np.nonzero(np.isfinite(heights))
     cell = profile["transform"].a
     cloth = CSF.CSF()
@@ -78,10 +72,7 @@ def csf(cells, _, out):
 
 
 def bulldozer(_, filled, out):
-    from bulldozer.pipeline.bulldozer_pipeline import dsm_to_dtm
-    folder = pathlib.Path(out).with_suffix("")
-    dsm_to_dtm(dsm_path=str(filled), output_dir=str(folder), nb_max_workers=2)
-    os.replace(next(folder.rglob("*[dD][tT][mM].tif")), out)
+    dtm.bulldozer(filled, out)
 
 
 def dsm2dtm(_, filled, out):
@@ -115,7 +106,7 @@ def progressive(surface, cell_m, slope, window_m):
 
 def smrf(cells, _, out, slope=0.15, window_m=18.0, threshold_m=0.5, scalar=1.25):
     """The filter of Pingel et al. (2013) as PDAL's filters.smrf runs it on points, which are the cells here."""
-    heights, profile = read(cells)
+    heights, profile = dtm.read(cells)
     side = max(1, round(1.0 / profile["transform"].a))
     cell_m = side * profile["transform"].a
     wide = [(0, -size % side) for size in heights.shape]
