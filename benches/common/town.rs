@@ -6,6 +6,8 @@
 //! g`, which an RPC holds exactly: a step of [`PERIOD_M`] on the ground is a step of whole pixels
 //! in all images, so one rendered tile per view makes images of any size.
 
+use std::sync::LazyLock;
+
 use camera::{ImagePoint, Rpc};
 use numeric::random::{hash64, unit_interval};
 use raster::Grid;
@@ -23,6 +25,8 @@ pub(crate) const ORIGIN: (f64, f64) = (5.4, 43.55);
 pub(crate) const METRES_PER_DEGREE: [f64; 2] = [80_800.0, 111_110.0];
 /// Buildings stand on a lattice of this spacing, metres.
 const BLOCK_M: f64 = 64.0;
+/// Blocks along a side of the town that repeats.
+const BLOCKS_ACROSS: usize = (PERIOD_M / BLOCK_M) as usize;
 
 /// What a view sees, and how.
 #[derive(Debug, Clone, Copy)]
@@ -44,21 +48,52 @@ impl Look {
     }
 }
 
+/// A building in the middle of its block, metres.
+#[derive(Debug, Clone, Copy)]
+struct Building {
+    half: [f64; 2],
+    eaves: f64,
+    /// Height of the ridge above the eaves; zero for a flat roof.
+    ridge: f64,
+}
+
+/// The blocks of a period, row by row; `None` for a block without a building.
+static BLOCKS: LazyLock<Vec<Option<Building>>> = LazyLock::new(|| {
+    let building = |at: usize| {
+        let key = |k: u64| uniform([k, (at % BLOCKS_ACROSS) as u64, (at / BLOCKS_ACROSS) as u64, 0]);
+        (key(0) >= 0.15).then(|| Building {
+            half: [8.0 + 14.0 * key(1), 7.0 + 12.0 * key(2)],
+            eaves: if key(3) > 0.96 { 52.0 } else { 5.0 + 17.0 * key(3) },
+            ridge: if key(4) > 0.5 { 4.0 } else { 0.0 },
+        })
+    };
+    (0..BLOCKS_ACROSS * BLOCKS_ACROSS).map(building).collect()
+});
+
 /// Returns the height of the surface above the ground height, metres.
 pub(crate) fn height(x: f64, y: f64) -> f64 {
-    let (i, j) = ((x / BLOCK_M).floor(), (y / BLOCK_M).floor());
-    let blocks = (PERIOD_M / BLOCK_M) as i64;
-    let key = |k: u64| uniform([k, (i as i64).rem_euclid(blocks) as u64, (j as i64).rem_euclid(blocks) as u64, 0]);
-    let ground = rolling(x, y);
-    let (u, v) = (x - (i + 0.5) * BLOCK_M, y - (j + 0.5) * BLOCK_M);
-    let half = [8.0 + 14.0 * key(1), 7.0 + 12.0 * key(2)];
-    if key(0) < 0.15 || u.abs() > half[0] || v.abs() > half[1] {
-        return ground;
-    }
-    let eaves = if key(3) > 0.96 { 52.0 } else { 5.0 + 17.0 * key(3) };
-    let ridge = if key(4) > 0.5 { 4.0 * (1.0 - v.abs() / half[1]) } else { 0.0 };
-    eaves + ridge
+    roof(x, y).unwrap_or_else(|| rolling(x, y))
 }
+
+/// Returns whether a point lies above the surface. The ground is computed only where it decides.
+fn is_above([x, y, z]: [f64; 3]) -> bool {
+    match roof(x, y) {
+        Some(roof) => z > roof,
+        None => z > MOST_GROUND_M || z > rolling(x, y),
+    }
+}
+
+fn roof(x: f64, y: f64) -> Option<f64> {
+    let (i, j) = ((x / BLOCK_M).floor(), (y / BLOCK_M).floor());
+    let [column, row] = [i, j].map(|at| (at as i64).rem_euclid(BLOCKS_ACROSS as i64) as usize);
+    let building = BLOCKS[row * BLOCKS_ACROSS + column]?;
+    let (u, v) = (x - (i + 0.5) * BLOCK_M, y - (j + 0.5) * BLOCK_M);
+    let is_inside = u.abs() <= building.half[0] && v.abs() <= building.half[1];
+    is_inside.then(|| building.eaves + building.ridge * (1.0 - v.abs() / building.half[1]))
+}
+
+/// Greatest height of the ground, metres: the sum of the waves' amplitudes.
+const MOST_GROUND_M: f64 = 5.5;
 
 fn rolling(x: f64, y: f64) -> f64 {
     let wave = |n: f64, v: f64| (std::f64::consts::TAU * n * v / PERIOD_M).sin();
@@ -112,10 +147,7 @@ pub(crate) fn tile(look: &Look) -> Grid<u16> {
 /// Returns the z at which a ray from above first meets the surface, by marching and bisection.
 fn hit(at: impl Fn(f64) -> [f64; 3]) -> f64 {
     const STEP_M: f64 = 0.5;
-    let is_above = |z: f64| {
-        let [x, y, _] = at(z);
-        z > height(x, y)
-    };
+    let is_above = |z: f64| is_above(at(z));
     let mut above = SPAN_M.1;
     while above > SPAN_M.0 && is_above(above - STEP_M) {
         above -= STEP_M;

@@ -24,6 +24,9 @@ pub(crate) struct Coarse {
     /// Heights about a pixel of parallax apart, each with the offsets at which a patch may lie: on
     /// the trajectory and to its sides.
     places: Vec<(f64, Vec<[i64; 2]>)>,
+    /// Row offset of the topmost places, and for each row from there on the column offset of its
+    /// first place and the number of columns up to its last one.
+    rows: (i64, Vec<(i64, usize)>),
 }
 
 /// A place tried, in the frame of the reference.
@@ -47,17 +50,21 @@ impl Coarse {
         remove_mean(picture.data_mut());
         let inverse_deviation = inverse_deviations(&picture, side, pair.source.noise_at(level), QUANTISATION_VARIANCE);
         picture.data_mut().iter_mut().filter(|v| v.is_nan()).for_each(|v| *v = 0.0);
-        Some(Self { map, origin, picture, inverse_deviation, places })
+        let rows = rows(&places);
+        Some(Self { map, origin, picture, inverse_deviation, places, rows })
     }
 
     /// Returns the height and source position of the best match of a patch around `p`, if it beats
     /// every other place by the margin.
     pub(crate) fn search(&self, p: [usize; 2], own: &Patch, config: &TieConfig) -> Option<(f64, [f64; 2])> {
+        let correlations = self.correlations(p, own, config.radius);
         let mut found = Vec::with_capacity(self.places.iter().map(|(_, places)| places.len()).sum());
         for (height_m, places) in &self.places {
             for offset in places {
-                let place = [p[0] as i64 + offset[0], p[1] as i64 + offset[1]];
-                if let Some(correlation) = self.correlation(own, place, config.radius) {
+                let (first, row) = &correlations[(offset[1] - self.rows.0) as usize];
+                let correlation = row[(offset[0] - first) as usize];
+                if !correlation.is_nan() {
+                    let place = [p[0] as i64 + offset[0], p[1] as i64 + offset[1]];
                     found.push(Candidate { correlation, height_m: *height_m, place });
                 }
             }
@@ -71,14 +78,43 @@ impl Coarse {
         stands_out.then(|| (best.height_m, self.map.at(place, self.map.mid_height_m())))
     }
 
-    /// Computes the correlation of a patch with the picture around a place; `None` outside the
-    /// picture or on invalid pixels.
-    fn correlation(&self, own: &Patch, place: [i64; 2], radius: i32) -> Option<f32> {
-        let x = usize::try_from(place[0] - self.origin[0] - i64::from(radius)).ok()?;
-        let y = usize::try_from(place[1] - self.origin[1] - i64::from(radius)).ok()?;
-        let inverse = *self.inverse_deviation.get(x, y)?;
-        (!inverse.is_nan()).then(|| own.product_at(&self.picture, (x, y)) * inverse / (2 * radius + 1) as f32)
+    /// Computes the correlations of a patch around `p` with the picture: for each row of places the
+    /// first column offset and the correlations from there on. NaN outside the picture and on invalid
+    /// pixels.
+    fn correlations(&self, p: [usize; 2], own: &Patch, radius: i32) -> Vec<(i64, Vec<f32>)> {
+        let side = 2 * radius as usize + 1;
+        let columns = (self.picture.width() + 1).saturating_sub(padded(side)) as i64;
+        let corner = [0, 1].map(|axis| p[axis] as i64 - self.origin[axis] - i64::from(radius));
+        let (top, rows) = &self.rows;
+        let scores = |(row, &(first, count)): (i64, &(i64, usize))| {
+            let mut scores = vec![f32::NAN; count];
+            let from = corner[0] + first;
+            let (low, high) = (from.max(0), (from + count as i64).min(columns));
+            if low < high && (0..self.inverse_deviation.height() as i64).contains(&row) {
+                let within = &mut scores[(low - from) as usize..(high - from) as usize];
+                own.products(&self.picture, (low as usize, row as usize), within);
+                let inverse = &self.inverse_deviation.row(row as usize)[low as usize..];
+                within.iter_mut().zip(inverse).for_each(|(score, inverse)| *score = *score * inverse / side as f32);
+            }
+            (first, scores)
+        };
+        (corner[1] + top..).zip(rows).map(scores).collect()
     }
+}
+
+/// Returns the first row offset of the places, and for each row from it to the last one the first
+/// column offset and the number of columns up to the last one.
+fn rows(places: &[(f64, Vec<[i64; 2]>)]) -> (i64, Vec<(i64, usize)>) {
+    let all = || places.iter().flat_map(|(_, places)| places);
+    let (top, bottom) = all().fold((i64::MAX, i64::MIN), |(a, b), [_, row]| (a.min(*row), b.max(*row)));
+    let mut rows = vec![(0, 0); usize::try_from(bottom.saturating_sub(top)).map_or(0, |last| last + 1)];
+    for &[column, row] in all() {
+        let (first, count) = &mut rows[(row - top) as usize];
+        let last = if *count == 0 { column } else { column.max(*first + *count as i64 - 1) };
+        *first = if *count == 0 { column } else { column.min(*first) };
+        *count = (last - *first) as usize + 1;
+    }
+    (top, rows)
 }
 
 /// Returns the offsets along the height trajectory, in steps of about a pixel, with up to `band`

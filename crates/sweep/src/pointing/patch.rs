@@ -8,6 +8,9 @@ use super::moments::inverse_deviations;
 
 /// Values that are worked on together. Rows of patches are padded to multiples of it.
 const LANES: usize = 16;
+/// Neighbouring places that are compared together: four vectors of eight values hide the latency of
+/// an addition.
+const TOGETHER: usize = 32;
 /// Correlation with a part of a picture that has no valid pixels or no texture.
 pub(crate) const NO_PIXELS: f32 = -1.0;
 
@@ -47,10 +50,19 @@ impl Patch {
         Some(Self { side, values })
     }
 
-    /// Returns the sum of products with the part of a picture that begins at `(x, y)`. The picture
-    /// must be free of NaN and have [`padded`] columns from there on.
-    pub(crate) fn product_at(&self, picture: &Grid<f32>, at: (usize, usize)) -> f32 {
-        product(&self.values, padded(self.side), picture, at)
+    /// Computes the sums of products with the parts of a picture that begin at `(x, y)`, `(x + 1,
+    /// y)` and so on. The picture must be free of NaN and have [`padded`] columns from the last
+    /// one on.
+    pub(crate) fn products(&self, picture: &Grid<f32>, (x, y): (usize, usize), out: &mut [f32]) {
+        let stride = padded(self.side);
+        let (together, rest) = out.as_chunks_mut::<TOGETHER>();
+        for (at, sums) in (x..).step_by(TOGETHER).zip(together.iter_mut()) {
+            products_together(&self.values, stride, picture, (at, y), sums);
+        }
+        let at = x + TOGETHER * together.len();
+        for (x, sum) in (at..).zip(rest) {
+            *sum = product(&self.values, stride, picture, (x, y));
+        }
     }
 
     /// Returns the zero-mean normalised cross-correlation with every part of a picture;
@@ -61,14 +73,15 @@ impl Patch {
         let mut scores = inverse_deviations(&picture, self.side, noise, 0.0);
         picture.data_mut().iter_mut().filter(|v| v.is_nan()).for_each(|v| *v = 0.0);
         let columns = (picture.width() + 1).saturating_sub(padded(self.side));
+        let mut products = vec![0.0; columns.min(scores.width())];
         for y in 0..scores.height() {
-            for (x, score) in scores.row_mut(y).iter_mut().enumerate() {
-                *score = if x < columns && !score.is_nan() {
-                    *score * self.product_at(&picture, (x, y)) / self.side as f32
-                } else {
-                    NO_PIXELS
-                };
+            self.products(&picture, (0, y), &mut products);
+            let row = scores.row_mut(y);
+            let (within, behind) = row.split_at_mut(products.len());
+            for (score, product) in within.iter_mut().zip(&products) {
+                *score = if score.is_nan() { NO_PIXELS } else { *score * product / self.side as f32 };
             }
+            behind.fill(NO_PIXELS);
         }
         scores
     }
@@ -83,6 +96,31 @@ fn product(values: &[f32], stride: usize, picture: &Grid<f32>, at: (usize, usize
         }
     }
     sums.iter().sum()
+}
+
+/// Adds in the order of [`product`], so that a place has the same bits alone and beside others.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
+fn products_together(
+    values: &[f32],
+    stride: usize,
+    picture: &Grid<f32>,
+    (x, y): (usize, usize),
+    out: &mut [f32; TOGETHER],
+) {
+    let width = picture.width();
+    let under = &picture.data()[y * width + x..];
+    let mut sums = [0.0f32; TOGETHER];
+    for lane in 0..LANES {
+        let mut sum = [0.0f32; TOGETHER];
+        for (row, own) in values.chunks_exact(stride).enumerate() {
+            for column in (lane..stride).step_by(LANES) {
+                let other = &under[row * width + column..][..TOGETHER];
+                (0..TOGETHER).for_each(|i| sum[i] += own[column] * other[i]);
+            }
+        }
+        (0..TOGETHER).for_each(|i| sums[i] += sum[i]);
+    }
+    *out = sums;
 }
 
 type Lanes = [f32; LANES];
@@ -137,7 +175,9 @@ mod tests {
             let expected = dot(&a, &b) / (dot(&a, &a) * dot(&b, &b)).sqrt();
             let found = scores[at];
             assert!((f64::from(found) - expected).abs() < 1e-4, "{found} {expected} at {at:?}");
-            let product = f64::from(patch.product_at(&other, at)) / dot(&b, &b).sqrt();
+            let mut products = [0.0];
+            patch.products(&other, at, &mut products);
+            let product = f64::from(products[0]) / dot(&b, &b).sqrt();
             assert!(at == (18, 3) || (product - expected).abs() < 1e-4, "{product} {expected} at {at:?}");
         }
         assert_eq!(scores[(19, 0)], NO_PIXELS);
@@ -147,5 +187,23 @@ mod tests {
             Patch::around(&other, [30.0, 6.0], 7, 0.1).is_none() && Patch::around(&image, [3.0, 9.0], 7, 0.1).is_none()
         );
         assert!(Patch::around(&image, [15.0, 12.0], 7, 30.0).is_none());
+    }
+
+    /// Patches of one and of two vectors of columns, at places that are worked on together and at
+    /// the rest of them.
+    #[test]
+    fn a_place_has_the_same_bits_alone_and_beside_others() {
+        let value = |k: usize| ((k * k) as f32 * 0.013).sin() * 30.0 + (k % 7) as f32;
+        let picture = Grid::from_vec(130, 40, (0..130 * 40).map(value).collect()).unwrap();
+        for radius in [7, 12] {
+            let patch = Patch::around(&picture, [60.0, 20.0], radius, 0.1).unwrap();
+            let mut products = vec![0.0; 2 * TOGETHER + 5];
+            patch.products(&picture, (3, 4), &mut products);
+            for (at, product) in (3..).zip(&products) {
+                let mut alone = [0.0];
+                patch.products(&picture, (at, 4), &mut alone);
+                assert_eq!(alone[0].to_bits(), product.to_bits(), "radius {radius}, column {at}");
+            }
+        }
     }
 }
