@@ -10,12 +10,14 @@ use raster::Grid;
 /// Returns the height at a fractional cell position, or `None` if the nearest cell is void or
 /// outside.
 pub fn bilinear(grid: &Grid<f32>, column: f64, row: f64) -> Option<f64> {
-    let (left, top) = (column.floor(), row.floor());
-    let (u, v) = (column - left, row - top);
+    let (left, top) = (floor(column)?, floor(row)?);
+    let (u, v) = (column - left as f64, row - top as f64);
     let (nearest_right, nearest_low) = (u >= 0.5, v >= 0.5);
-    let (left, top) = (whole(left)?, whole(top)?);
     let corner = |right: bool, low: bool| finite(grid, left + i64::from(right), top + i64::from(low));
     let nearest = corner(nearest_right, nearest_low)?;
+    if u == 0.0 && v == 0.0 {
+        return Some(nearest);
+    }
     let mut sum = 0.0;
     let mut weights = 0.0;
     for (right, low) in [(false, false), (true, false), (false, true), (true, true)] {
@@ -33,14 +35,15 @@ pub fn bilinear(grid: &Grid<f32>, column: f64, row: f64) -> Option<f64> {
 /// Returns the cell nearest to a fractional position, or `None` outside the grid. Halves go to the
 /// higher index.
 pub fn nearest<T: Copy>(grid: &Grid<T>, column: f64, row: f64) -> Option<T> {
-    let (column, row) = (whole((column + 0.5).floor())?, whole((row + 0.5).floor())?);
+    let (column, row) = (floor(column + 0.5)?, floor(row + 0.5)?);
     grid.get(usize::try_from(column).ok()?, usize::try_from(row).ok()?).copied()
 }
 
-/// Converts a whole-valued float to an index. Returns `None` for NaN and for values that no grid
-/// can hold.
-fn whole(value: f64) -> Option<i64> {
-    (value.abs() < 1e15).then_some(value as i64)
+/// Returns the greatest index that is not above a position. Returns `None` for NaN and for values
+/// that no grid can hold.
+fn floor(value: f64) -> Option<i64> {
+    let towards_zero = value as i64;
+    (value.abs() < 1e15).then(|| towards_zero - i64::from(value < towards_zero as f64))
 }
 
 fn finite(grid: &Grid<f32>, column: i64, row: i64) -> Option<f64> {

@@ -4,8 +4,9 @@
 //! fetch the nodes of the level of detail that they want. The cells of a surface lie on a lattice,
 //! so the levels need no random choice: with D the deepest level, a node of level L holds the cells
 //! whose column and row are multiples of 2^(D−L), and not of twice that. A node has at most
-//! 256 × 256 cells of its own lattice. Chunks are compressed in parallel and written in the order
-//! of their keys, so the bytes do not depend on the threads.
+//! 256 × 256 cells of its own lattice; on a map in degrees it is a layer of the height, of any
+//! size. Chunks are compressed in parallel and written in the order of their keys, so the bytes do
+//! not depend on the threads.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -204,8 +205,14 @@ impl Octree {
         let cell = cell_x.min(cell_y);
         let extent = [0, 1, 2].map(|axis| layout.extent.high[axis] - low[axis]);
         // A little more than the extent, so that the last point lies inside.
-        let side = extent.into_iter().fold(cell, f64::max) * (1.0 + 1e-6) + layout.step[2];
-        let depth = ((side / (cell * NODE_CELLS)).log2().ceil().max(0.0) as u32).min(DEPTH_MAX);
+        let reach =
+            |axes: usize| extent[..axes].iter().copied().fold(cell, f64::max) * (1.0 + 1e-6) + layout.step[axes - 1];
+        let side = reach(3);
+        // Tens of metres of height beside a thousandth of a degree would make levels until each
+        // point has a chunk of its own. There the places alone count, and nodes are layers of the
+        // height.
+        let widest = if layout.cloud.in_degrees { reach(2) } else { side };
+        let depth = ((widest / (cell * NODE_CELLS)).log2().ceil().max(0.0) as u32).min(DEPTH_MAX);
         let mut nodes: BTreeMap<NodeKey, Vec<u32>> = BTreeMap::new();
         for index in layout.cells() {
             let halvings = ((index % width) | (index / width)).trailing_zeros().min(depth);

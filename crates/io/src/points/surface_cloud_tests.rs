@@ -43,10 +43,21 @@ impl Rasters {
     }
 
     fn write(&self, path: &std::path::Path, format: CloudFormat, observed_only: bool) -> CloudExtent {
+        let geotransform = GeoTransform::north_up(431_000.1, 3_358_000.0, 0.5);
+        self.write_at((geotransform, 32617), path, format, observed_only)
+    }
+
+    fn write_at(
+        &self,
+        (geotransform, horizontal): (GeoTransform, u32),
+        path: &std::path::Path,
+        format: CloudFormat,
+        observed_only: bool,
+    ) -> CloudExtent {
         let cloud = SurfaceCloud {
-            geotransform: GeoTransform::north_up(431_000.1, 3_358_000.0, 0.5),
-            crs: Crs { horizontal: 32617, vertical: VerticalDatum::Egm96 },
-            in_degrees: false,
+            geotransform,
+            crs: Crs { horizontal, vertical: VerticalDatum::Egm96 },
+            in_degrees: horizontal == 4326,
             heights: &self.heights,
             sigma_m: &self.sigma_m,
             confidence: &self.confidence,
@@ -112,14 +123,30 @@ fn points_have_the_values_of_their_cells() {
     }
 }
 
-/// The nodes of the hierarchy cover all points, each node has its parent, and its points lie in it.
 #[test]
 fn nodes_hold_the_points_of_their_cubes() {
-    let rasters = Rasters::new();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("cloud.copc.laz");
-    let extent = rasters.write(&path, CloudFormat::Copc, true);
-    let bytes = std::fs::read(&path).unwrap();
+    let extent = Rasters::new().write(&path, CloudFormat::Copc, true);
+    let counts = points_of_nodes(&path, &extent);
+    assert!(counts.len() > 4 && counts.iter().all(|points| *points <= 256 * 256), "{counts:?}");
+}
+
+/// Heights reach over 35 units and places over a hundredth of one.
+#[test]
+fn a_map_in_degrees_has_few_nodes() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("cloud.copc.laz");
+    let degrees = (GeoTransform::north_up(-81.7, 30.35, 1e-5), 4326);
+    let extent = Rasters::new().write_at(degrees, &path, CloudFormat::Copc, true);
+    let counts = points_of_nodes(&path, &extent);
+    assert!((3..=12).contains(&counts.len()), "{counts:?}");
+}
+
+/// Returns the number of points of each node of a COPC file. The nodes cover all points, each has
+/// its parent, and its points lie in it.
+fn points_of_nodes(path: &std::path::Path, extent: &CloudExtent) -> Vec<i32> {
+    let bytes = std::fs::read(path).unwrap();
     let long = |at: usize| u64::from_le_bytes(bytes[at..at + 8].try_into().unwrap());
     let float = |at: usize| f64::from_bits(long(at));
     assert_eq!(&bytes[377..381], b"copc");
@@ -141,12 +168,11 @@ fn nodes_hold_the_points_of_their_cubes() {
         k[2] >> 1,
         k[3] >> 1
     ])));
-    assert!(nodes.len() > 4 && nodes.values().all(|node| node.2 <= 256 * 256));
     // Chunks follow each other in the order of the file, as the points do.
     let mut in_file: Vec<_> = nodes.iter().filter(|(_, node)| node.2 > 0).collect();
     in_file.sort_by_key(|(_, node)| node.0);
     assert!(in_file.windows(2).all(|pair| pair[0].1.0 + pair[0].1.1 as u64 == pair[1].1.0));
-    let mut points = read(&path).1.into_iter();
+    let mut points = read(path).1.into_iter();
     for (key, node) in in_file {
         let side = 2.0 * half / f64::from(1 << key[0]);
         for point in points.by_ref().take(node.2 as usize) {
@@ -157,4 +183,5 @@ fn nodes_hold_the_points_of_their_cubes() {
         }
     }
     assert!(points.next().is_none());
+    nodes.values().map(|node| node.2).collect()
 }
