@@ -79,8 +79,8 @@ impl Coarse {
     }
 
     /// Computes the correlations of a patch around `p` with the picture: for each row of places the
-    /// first column offset and the correlations from there on. NaN outside the picture and on invalid
-    /// pixels.
+    /// first column offset and the correlations from there on. NaN outside the picture and on
+    /// invalid pixels.
     fn correlations(&self, p: [usize; 2], own: &Patch, radius: i32) -> Vec<(i64, Vec<f32>)> {
         let side = 2 * radius as usize + 1;
         let columns = (self.picture.width() + 1).saturating_sub(padded(side)) as i64;
