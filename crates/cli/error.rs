@@ -4,8 +4,10 @@
 use std::fmt;
 use std::io::{ErrorKind, Write};
 
+use numeric::{Failure, Kind};
+
 /// Hint for an output that exists.
-pub(crate) const OVERWRITE: &str = "nothing was written: give --overwrite to replace it";
+const OVERWRITE: &str = "nothing was written: give --overwrite to replace it";
 
 /// Hint for an input on a network.
 const REMOTE: &str = "--allow-remote reads rasters from web addresses (https://…) that are given as inputs";
@@ -23,15 +25,30 @@ impl fmt::Display for Hint {
     }
 }
 
-/// Adds a hint to an error of the library, where there is one.
-pub(crate) fn with_hint<E>(error: E, hint: Option<impl Into<String>>) -> anyhow::Error
+/// Adds a hint to an error of the library: the one given, or else that of its kind, where there is
+/// one.
+pub(crate) fn with_hint<E>(error: E, hint: Option<&str>) -> anyhow::Error
 where
-    E: std::error::Error + Send + Sync + 'static,
+    E: Failure + Send + Sync + 'static,
 {
-    match hint {
-        Some(hint) => anyhow::Error::new(error).context(Hint(hint.into())),
+    let of_kind = || match error.kind() {
+        Kind::OutputExists => Some(OVERWRITE),
+        Kind::RemoteRefused => Some(REMOTE),
+        Kind::GridMissing => Some(GRIDS),
+        _ => None,
+    };
+    match hint.or_else(of_kind) {
+        Some(hint) => anyhow::Error::new(error).context(Hint(hint.to_owned())),
         None => error.into(),
     }
+}
+
+/// Adds the hint of its kind to an error of the library, where there is one.
+pub(crate) fn hinted<E>(error: E) -> anyhow::Error
+where
+    E: Failure + Send + Sync + 'static,
+{
+    with_hint(error, None)
 }
 
 /// Whether the reader of our output went away (`skysweep … | head`), which is not our error.
@@ -53,10 +70,7 @@ pub(crate) fn report(e: &anyhow::Error) {
         }
         last = cause;
     }
-    let overwrite = || text.contains(io::atomic::OUTPUT_EXISTS).then(|| OVERWRITE.to_owned());
-    let remote = || text.contains("or allow addresses").then(|| REMOTE.to_owned());
-    let grids = || text.contains("or allow grids to be fetched").then(|| GRIDS.to_owned());
-    if let Some(hint) = hint.map(Hint::to_string).or_else(overwrite).or_else(remote).or_else(grids) {
+    if let Some(hint) = hint {
         text.push_str(&format!("  hint: {hint}\n"));
     }
     // Where even standard error is closed, only the exit code is left.

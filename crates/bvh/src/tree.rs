@@ -1,5 +1,7 @@
 //! The tree that rays are cast at.
 
+use numeric::failures;
+
 use crate::node::Node;
 
 /// Triangles in a bounding volume hierarchy.
@@ -45,6 +47,8 @@ pub enum BvhError {
         limit: usize,
     },
 }
+
+failures!(BvhError: Input);
 
 impl Bvh {
     /// Returns the number of triangles.

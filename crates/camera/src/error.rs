@@ -1,5 +1,7 @@
 //! Errors of projection and localisation, and of coefficients that do not form a camera.
 
+use numeric::failures;
+
 /// A point that cannot be projected or localised.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -37,6 +39,8 @@ pub enum CameraError {
     #[error("the camera's Jacobian is singular at this point")]
     Singular,
 }
+
+failures!(CameraError: Input);
 
 /// Coefficients that do not form a camera.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
@@ -97,6 +101,8 @@ pub enum RpcError {
     )]
     Degenerate,
 }
+
+failures!(RpcError: Input);
 
 /// The RPC00B name of an entry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

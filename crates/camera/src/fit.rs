@@ -12,6 +12,7 @@
 
 use geodesy::LonLatHeight;
 use nalgebra::{DMatrix, DVector};
+use numeric::failures;
 
 use crate::limits::short_way;
 use crate::polynomial::terms;
@@ -79,6 +80,8 @@ pub enum FitError {
     #[error("the camera to be fitted fails inside its domain: {0}")]
     Camera(#[from] CameraError),
 }
+
+failures!(FitError: Input);
 
 impl RpcFit {
     /// Fits a model to correspondences.

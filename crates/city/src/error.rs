@@ -1,5 +1,7 @@
 //! Inconsistencies in a model.
 
+use numeric::failures;
+
 /// An inconsistent model or mesh, or the text of a level of detail that is invalid.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -62,3 +64,5 @@ pub enum ModelError {
         triangle: usize,
     },
 }
+
+failures!(ModelError: Input);

@@ -4,6 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use city::DefectCode;
+use numeric::failures;
 
 use io::atomic::SaveError;
 
@@ -41,6 +42,8 @@ pub enum CityError {
     #[error(transparent)]
     NotWritten(#[from] SaveError),
 }
+
+failures!(CityError: File { Self::NotWritten(error) => error.kind() });
 
 /// A fault of the content of a file, with its number in the catalogue and its place.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

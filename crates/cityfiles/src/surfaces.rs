@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 
 use city::{MeshConfig, ObjectStatus, TriangleMesh};
 use crs::{CrsIdentity, VerticalDatum};
+use numeric::failures;
 
 use crate::CityError;
 use io::open_regular;
@@ -62,6 +63,12 @@ pub enum SurfaceFileError {
         what: String,
     },
 }
+
+failures!(SurfaceFileError: File {
+    Self::City(error) => error.kind(),
+    Self::Points(error) => error.kind(),
+    Self::Origin(error) => error.kind(),
+});
 
 /// Returns whether a file holds a surface that is not a raster.
 ///

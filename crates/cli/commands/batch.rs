@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use jobs::batch::read_batch;
 
+use crate::error::hinted;
 use crate::progress::ShowOptions;
 use crate::{Global, Outcome};
 
@@ -28,15 +29,15 @@ pub(crate) struct Args {
 
 /// Runs `skysweep batch`.
 pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
-    let mut batch = read_batch(&args.file)?;
-    batch.select(&args.only)?;
+    let mut batch = read_batch(&args.file).map_err(hinted)?;
+    batch.select(&args.only).map_err(hinted)?;
     if args.dry_run {
-        let report = jobs::batch::look(&batch)?;
+        let report = jobs::batch::look(&batch).map_err(hinted)?;
         args.show.print(global, &report, || report.text())?;
         let what = || "tasks that would fail; the list names the reasons".to_owned();
         return Ok(if report.has_failed() { Outcome::Partial(what()) } else { Outcome::Complete });
     }
-    let report = args.show.watch(global, &batch.output, |watcher| jobs::batch::run(&batch, watcher))?;
+    let report = args.show.watch(global, &batch.output, |watcher| jobs::batch::run(&batch, watcher)).map_err(hinted)?;
     args.show.print(global, &report, || report.text())?;
     let what = || format!("tasks that are not complete: {}; the report names the reasons", report.incomplete);
     Ok(if report.incomplete == 0 { Outcome::Complete } else { Outcome::Partial(what()) })

@@ -7,6 +7,7 @@ use crs::VerticalDatum;
 use eval::AlignmentMethod;
 use jobs::diff::DiffConfig;
 
+use crate::error::hinted;
 use crate::options::named;
 use crate::progress::RunOptions;
 use crate::{Global, Outcome};
@@ -91,7 +92,7 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
     config.threads = args.run.threads;
     config.overwrite = args.run.overwrite;
     let show = args.run.show;
-    let report = show.watch(global, &args.output, |watcher| jobs::diff::run(&config, watcher))?;
+    let report = show.watch(global, &args.output, |watcher| jobs::diff::run(&config, watcher)).map_err(hinted)?;
     show.print(global, &report, || report.text())?;
     Ok(Outcome::Complete)
 }

@@ -13,7 +13,7 @@ use jobs::job_file::is_job_file;
 use jobs::production::{ProductionError, make_plan};
 use jobs::products::ProductKind;
 
-use crate::error::{OVERWRITE, with_hint};
+use crate::error::with_hint;
 use crate::options::named;
 use crate::progress::ShowOptions;
 use crate::{Global, Outcome};
@@ -257,7 +257,6 @@ pub(crate) fn production_hinted(error: ProductionError) -> anyhow::Error {
 /// Returns the options that help against an error.
 fn hint(error: &DsmError) -> Option<&'static str> {
     Some(match error {
-        DsmError::Exists { .. } => OVERWRITE,
         DsmError::NoPointing { .. } => "--no-pointing uses the RPCs as they are",
         DsmError::NoTies { .. } => "--height-range LO HI gives the heights to search, and --dem takes them from a file",
         DsmError::RangeMissesScene { .. } => "without --height-range the heights are found from tie points",

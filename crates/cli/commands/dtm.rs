@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use jobs::dtm::DtmConfig;
 use terrain::GroundConfig;
 
+use crate::error::hinted;
 use crate::progress::RunOptions;
 use crate::{Global, Outcome};
 
@@ -34,7 +35,7 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
     config.threads = args.run.threads;
     config.overwrite = args.run.overwrite;
     let show = args.run.show;
-    let report = show.watch(global, &args.output, |watcher| jobs::dtm::run(&config, watcher))?;
+    let report = show.watch(global, &args.output, |watcher| jobs::dtm::run(&config, watcher)).map_err(hinted)?;
     show.print(global, &report, || report.text())?;
     let none = "no cell shows the ground; the outputs hold none".to_owned();
     Ok(if report.cells_ground == 0 { Outcome::Partial(none) } else { Outcome::Complete })

@@ -16,7 +16,7 @@ use jobs::eval::{
 };
 use numeric::Progress;
 
-use crate::error::{OVERWRITE, with_hint};
+use crate::error::with_hint;
 use crate::options::named;
 use crate::progress::ShowOptions;
 use crate::{Global, Outcome};
@@ -286,7 +286,6 @@ fn maps(args: &Args, global: Global) -> anyhow::Result<Vec<String>> {
 /// Adds the option that helps with an error.
 fn hinted(error: EvalJobError) -> anyhow::Error {
     let hint = match &error {
-        EvalJobError::ForeignFile { .. } => Some(OVERWRITE),
         EvalJobError::DatumUnknown { unknown: "test", .. } => Some("give --test-vertical"),
         EvalJobError::DatumUnknown { .. } => Some("give --ref-vertical"),
         EvalJobError::NoEpsgForErrorMap => Some("leave --error-map out"),

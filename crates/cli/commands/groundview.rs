@@ -12,7 +12,7 @@ use jobs::city_files::CitySurfaceError;
 use jobs::error::JobError;
 use jobs::groundview::{ComposeConfig, GroundCameras, GroundViewConfig, GroundViewError};
 
-use crate::error::{OVERWRITE, with_hint};
+use crate::error::with_hint;
 use crate::interrupt::{self, Interruptible};
 use crate::progress::{Log, RunOptions};
 use crate::stand::StandArgs;
@@ -155,7 +155,6 @@ fn compose(args: &ComposeArgs) -> anyhow::Result<Outcome> {
 /// Adds the option that helps with an error.
 fn hinted(error: GroundViewError) -> anyhow::Error {
     let hint = match &error {
-        GroundViewError::FolderInUse { .. } => Some(OVERWRITE),
         GroundViewError::NoGround => Some("give --camera-height"),
         GroundViewError::City(CitySurfaceError::NoSurface { .. }) => Some("skysweep city info tells why"),
         GroundViewError::PlacedModel(_) => Some("skysweep align brings cameras to a map, --crs names it"),

@@ -18,7 +18,7 @@ use jobs::heightmap::{
 };
 
 use crate::corrections::code_of;
-use crate::error::{OVERWRITE, with_hint};
+use crate::error::with_hint;
 use crate::options::named;
 use crate::progress::{RunOptions, WriteOptions};
 use crate::stand::StandArgs;
@@ -208,7 +208,6 @@ fn hinted(error: HeightMapJobError) -> anyhow::Error {
 /// Returns the option that helps with an error.
 pub(crate) fn hint(error: &HeightMapJobError) -> Option<&'static str> {
     match error {
-        HeightMapJobError::OtherMap { .. } => Some(OVERWRITE),
         HeightMapJobError::NoCrs { .. } => Some("give --source-crs"),
         HeightMapJobError::City(CitySurfaceError::NoSurface { .. }) => Some("skysweep city info tells why"),
         HeightMapJobError::Stand(StandError::NotFinite { .. }) => {

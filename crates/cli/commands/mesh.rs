@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use jobs::mesh::{DepthSource, MeshJobConfig};
 
+use crate::error::hinted;
 use crate::progress::RunOptions;
 use crate::{Global, Outcome};
 
@@ -74,7 +75,7 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
     config.threads = args.run.threads;
     config.overwrite = args.run.overwrite;
     let show = args.run.show;
-    let report = show.watch(global, &args.output, |watcher| jobs::mesh::run(&config, watcher))?;
+    let report = show.watch(global, &args.output, |watcher| jobs::mesh::run(&config, watcher)).map_err(hinted)?;
     show.print(global, &report, || report.text())?;
     Ok(Outcome::Complete)
 }

@@ -10,6 +10,7 @@ use crs::{CrsRequest, VerticalDatum};
 use jobs::priors::{
     LensFault, PriorsClassWeight, PriorsConfig, PriorsImages, PriorsJobError, PriorsMiss, PriorsMode, PriorsTrainer,
 };
+use numeric::{Failure, Kind};
 
 use crate::corrections::code_of;
 use crate::error::with_hint;
@@ -169,7 +170,9 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
 /// Names the options that mend an error.
 fn hinted(error: PriorsJobError) -> anyhow::Error {
     let hint = match &error {
-        PriorsJobError::Job(error) if error.is_existing_output() => Some("choose another folder or pass --overwrite"),
+        PriorsJobError::Job(error) if error.kind() == Kind::OutputExists => {
+            Some("choose another folder or pass --overwrite")
+        }
         PriorsJobError::NothingInSight { .. } => Some("state it with --offset or --transform"),
         PriorsJobError::NoPicture { .. } => Some("--images=DIR names the folder of the pictures"),
         PriorsJobError::NotSatellite => Some("leave out --model-crs, --model-vertical and --corrections"),

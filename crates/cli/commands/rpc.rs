@@ -15,7 +15,7 @@ use jobs::rpc::{
     RpcPointsConfig, RpcQuery,
 };
 
-use crate::error::with_hint;
+use crate::error::{hinted, with_hint};
 use crate::options::named;
 use crate::progress::{Log, WriteOptions};
 use crate::{Global, Outcome, print};
@@ -147,7 +147,7 @@ pub(crate) fn run(command: &Command, global: Global) -> anyhow::Result<Outcome> 
 }
 
 fn info(args: &InfoArgs, global: Global) -> anyhow::Result<Outcome> {
-    let report = jobs::rpc::info(&RpcInfoConfig::new(args.file.clone()), &Log)?;
+    let report = jobs::rpc::info(&RpcInfoConfig::new(args.file.clone()), &Log).map_err(hinted)?;
     tracing::info!("{}: {}", report.source, report.format);
     print::report(args.json, !global.is_quiet(), &report, || report.text())?;
     Ok(Outcome::Complete)
@@ -215,13 +215,13 @@ fn answer(
     json: bool,
 ) -> anyhow::Result<Outcome> {
     if let Some(query) = query {
-        let report = jobs::rpc::points(&RpcPointsConfig::new(file.to_owned(), vec![query]), &Log)?;
+        let report = jobs::rpc::points(&RpcPointsConfig::new(file.to_owned(), vec![query]), &Log).map_err(hinted)?;
         let lines: String = report.points.iter().map(|point| point.line(direction, json) + "\n").collect();
         print::text(&lines)?;
         return Ok(Outcome::Complete);
     }
     let mut input: Box<dyn BufRead> = match points.filter(|path| *path != Path::new("-")) {
-        Some(path) => jobs::rpc::open_lines(path)?,
+        Some(path) => jobs::rpc::open_lines(path).map_err(hinted)?,
         None => Box::new(std::io::stdin().lock()),
     };
     let mut output = std::io::BufWriter::new(std::io::stdout().lock());
@@ -232,7 +232,7 @@ fn answer(
         writeln!(output, "{}", answer.text(direction, json))
     };
     let config = RpcLinesConfig::new(file.to_owned(), direction);
-    let report = jobs::rpc::answer_lines(&config, &mut *input, &mut receive, &Log)?;
+    let report = jobs::rpc::answer_lines(&config, &mut *input, &mut receive, &Log).map_err(hinted)?;
     output.flush()?;
     if report.failed == 0 {
         return Ok(Outcome::Complete);

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use ::simulate::{PRESETS, SeasonsConfig, SimulationConfig};
 use jobs::simulate::{SimulateConfig, SimulateJobError};
 
-use crate::error::with_hint;
+use crate::error::{hinted, with_hint};
 use crate::progress::RunOptions;
 use crate::{Global, Outcome, print};
 
@@ -92,7 +92,7 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
 fn config(args: &Args) -> anyhow::Result<SimulationConfig> {
     let is_file = Path::new(&args.scene).extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"));
     let mut config = if is_file {
-        jobs::simulate::read_scene(Path::new(&args.scene))?
+        jobs::simulate::read_scene(Path::new(&args.scene)).map_err(hinted)?
     } else {
         SimulationConfig::preset(&args.scene)?
     };

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use jobs::split::SplitJobConfig;
 
+use crate::error::hinted;
 use crate::options::{Named, named};
 use crate::progress::WriteOptions;
 use crate::{Global, Outcome};
@@ -53,7 +54,8 @@ const PRESETS: [Named<Preset>; 2] = [
 pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
     let output = args.output.as_deref();
     let written = output.unwrap_or(Path::new(""));
-    let report = args.write.show.watch(global, written, |watcher| jobs::split::run(&config(args), watcher))?;
+    let report =
+        args.write.show.watch(global, written, |watcher| jobs::split::run(&config(args), watcher)).map_err(hinted)?;
     args.write.show.print(global, &report, || report.text())?;
     Ok(Outcome::Complete)
 }

@@ -8,7 +8,7 @@ use ortho::MosaicRule;
 
 use crate::commands::heightmap::{self, MakeArgs};
 use crate::corrections::corrections_of;
-use crate::error::{OVERWRITE, with_hint};
+use crate::error::with_hint;
 use crate::options::named;
 use crate::{Global, Outcome};
 
@@ -64,7 +64,6 @@ fn hinted(error: TilesError) -> anyhow::Error {
     let hint = match &error {
         TilesError::Map(error) => heightmap::hint(error),
         TilesError::NoImages { .. } => Some("give --images"),
-        TilesError::OtherTile { .. } => Some(OVERWRITE),
         _ => None,
     };
     with_hint(error, hint)

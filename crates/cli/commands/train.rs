@@ -10,6 +10,7 @@ use jobs::train::{
 };
 
 use crate::corrections::corrections_of;
+use crate::error::hinted;
 use crate::options::{Named, named};
 use crate::progress::RunOptions;
 use crate::{Global, Outcome};
@@ -193,7 +194,7 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
     config.threads = args.run.threads;
     config.overwrite = args.run.overwrite;
     let show = args.run.show;
-    let report = show.watch(global, &args.output, |watcher| jobs::train::run(&config, watcher))?;
+    let report = show.watch(global, &args.output, |watcher| jobs::train::run(&config, watcher)).map_err(hinted)?;
     show.print(global, &report, || report.text())?;
     Ok(Outcome::Complete)
 }
@@ -224,7 +225,8 @@ fn on_images(args: &Args, splats: &Path, global: Global) -> anyhow::Result<Outco
     config.threads = args.run.threads;
     config.overwrite = args.run.overwrite;
     let show = args.run.show;
-    let report = show.watch(global, &args.output, |watcher| jobs::train::run_on_images(&config, watcher))?;
+    let report =
+        show.watch(global, &args.output, |watcher| jobs::train::run_on_images(&config, watcher)).map_err(hinted)?;
     show.print(global, &report, || report.text())?;
     Ok(Outcome::Complete)
 }

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use geodesy::GeodesyError;
+use numeric::{Kind, failures};
 
 /// A coordinate reference system, a projection or a height conversion that is not available.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -101,6 +102,8 @@ pub enum CrsError {
         lengths: Vec<usize>,
     },
 }
+
+failures!(CrsError: Crs { Self::MissingGrid { .. } => Kind::GridMissing });
 
 /// Names folders.
 fn listed(folders: &[PathBuf]) -> String {

@@ -3,11 +3,13 @@
 use std::fmt;
 use std::path::PathBuf;
 
+use numeric::{Kind, failures};
 use report::plain_number;
 
+use crate::products::ProductsError;
 use crate::values::{HeightRange, MapBounds};
 use job::corrections::CorrectionsError;
-use job::error::from_steps;
+use job::error::{JobError, from_steps};
 use job::files::FileError;
 use job::threads::ThreadsError;
 
@@ -108,6 +110,8 @@ pub enum DsmError {
     Prior {
         /// File of the model.
         path: PathBuf,
+        /// Kind of the cause.
+        kind: Kind,
         /// Cause.
         source: Box<dyn std::error::Error + Send + Sync>,
     },
@@ -317,7 +321,7 @@ pub enum DsmError {
     File(FileError),
     /// The DSM is complete, but a product of it could not be made.
     #[error("the surface model is complete, but a product of it could not be made")]
-    Products(#[source] Box<dyn std::error::Error + Send + Sync>),
+    Products(#[source] Box<ProductsError>),
     /// A stored result of a chunk cannot be read.
     #[error("cannot read the result of a chunk ({reason}): {}", path.display())]
     ChunkFile {
@@ -369,6 +373,31 @@ pub enum DsmError {
     Cancelled,
 }
 
+failures!(DsmError: Other {
+    Self::TooFewImages { .. }
+    | Self::Folder { .. }
+    | Self::SameImage { .. }
+    | Self::Value { .. }
+    | Self::BoundsMissScene { .. }
+    | Self::RangeMissesScene { .. }
+    | Self::NoSuchChunk { .. }
+    | Self::Memory { .. } => Kind::Input,
+    Self::Exists { .. } => Kind::OutputExists,
+    Self::InUse { .. } => Kind::InUse,
+    Self::Output { .. } | Self::ChunkFile { .. } => Kind::File,
+    Self::Prior { kind, .. } => *kind,
+    Self::Area(error) => error.kind(),
+    Self::Control(error) => error.kind(),
+    Self::Corrections(error) => error.kind(),
+    Self::Image(error) => error.kind(),
+    Self::Rpc(error) => error.kind(),
+    Self::File(error) => error.kind(),
+    Self::Products(error) => error.kind(),
+    Self::Crs(error) => error.kind(),
+    Self::Threads(error) => error.kind(),
+    Self::Cancelled => Kind::Cancelled,
+});
+
 /// Writes a rectangle of longitudes and latitudes.
 pub(crate) fn degrees(place: MapBounds) -> String {
     let MapBounds { x_min, y_min, x_max, y_max } = place;
@@ -406,5 +435,14 @@ impl From<FileError> for DsmError {
 impl From<numeric::Cancelled> for DsmError {
     fn from(_: numeric::Cancelled) -> Self {
         Self::Cancelled
+    }
+}
+
+impl From<ProductsError> for DsmError {
+    fn from(error: ProductsError) -> Self {
+        match error {
+            ProductsError::Job(JobError::Cancelled(_)) => Self::Cancelled,
+            other => Self::Products(Box::new(other)),
+        }
     }
 }

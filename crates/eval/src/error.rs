@@ -1,5 +1,7 @@
 //! Errors of an evaluation.
 
+use numeric::failures;
+
 /// The reason why an evaluation is refused.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -114,6 +116,8 @@ pub enum EvalError {
         most: usize,
     },
 }
+
+failures!(EvalError: Input);
 
 fn skipped_text(skipped: usize) -> String {
     if skipped == 0 {

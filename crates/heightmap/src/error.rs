@@ -2,6 +2,7 @@
 
 use crs::CrsError;
 use geodesy::GeodesyError;
+use numeric::failures;
 
 /// A height map that cannot be made.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -76,3 +77,5 @@ pub enum HeightMapError {
     #[error(transparent)]
     Position(#[from] GeodesyError),
 }
+
+failures!(HeightMapError: Other { Self::Crs(error) => error.kind() });

@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use gdal::vector::LayerAccess;
 use gdal::{Dataset, DatasetOptions, GdalOpenFlags};
 use geo::{Coord, CoordsIter, LineString, MultiPolygon, Polygon};
+use numeric::failures;
 use serde_json::{Value, json};
 
 use crate::atomic::{SaveError, write_stream};
@@ -59,6 +60,8 @@ pub struct AreaError {
     /// Text found and text expected.
     pub what: String,
 }
+
+failures!(AreaError: File);
 
 /// Reads the area of a name, or all areas, from a GeoPackage (`.gpkg`), a shapefile (`.shp`), a
 /// GeoParquet file (`.parquet`) or a GeoJSON file.

@@ -15,18 +15,15 @@ use std::fs::File;
 use std::io::{BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
+use numeric::{Kind, failures};
 use tempfile::{Builder, TempPath};
-
-/// The first words of [`SaveError::Exists`], by which a caller can recognise it inside other
-/// errors.
-pub const OUTPUT_EXISTS: &str = "the output exists already";
 
 /// A file that was not written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SaveError {
     /// The output exists, and overwriting was not allowed.
-    #[error("{OUTPUT_EXISTS}: choose another name or allow overwriting: {}", .path.display())]
+    #[error("the output exists already: choose another name or allow overwriting: {}", .path.display())]
     Exists {
         /// The output.
         path: PathBuf,
@@ -53,6 +50,8 @@ pub enum SaveError {
         free_bytes: u64,
     },
 }
+
+failures!(SaveError: File { Self::Exists { .. } => Kind::OutputExists });
 
 impl SaveError {
     /// Returns the error of an output at `path` that cannot be written, with the reason as a text.

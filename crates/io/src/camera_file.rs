@@ -3,6 +3,8 @@
 
 use std::path::{Path, PathBuf};
 
+use numeric::failures;
+
 use crate::regular::read_regular;
 
 /// Why a file of cameras was not read.
@@ -28,6 +30,8 @@ pub enum CameraFileError {
         place: String,
     },
 }
+
+failures!(CameraFileError: File);
 
 /// A mistake in a file and its place, before the path of the file is known.
 #[derive(Debug)]

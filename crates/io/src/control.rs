@@ -14,6 +14,7 @@
 use std::path::{Path, PathBuf};
 
 use geodesy::{LonLatHeight, MapPoint};
+use numeric::failures;
 
 use crate::regular::read_regular;
 
@@ -76,6 +77,8 @@ pub enum ControlError {
         line: usize,
     },
 }
+
+failures!(ControlError: File);
 
 /// Reads a table of positions.
 ///

@@ -25,6 +25,7 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use camera::ImagePoint;
+use numeric::failures;
 use serde_json::Value;
 
 use crate::positions::records;
@@ -105,6 +106,8 @@ pub enum GroundPointsError {
         what: String,
     },
 }
+
+failures!(GroundPointsError: File);
 
 /// Reads ground points.
 ///

@@ -6,6 +6,7 @@
 
 use std::path::{Path, PathBuf};
 
+use numeric::failures;
 use raster::Window;
 
 use crate::npy::{self, NpyData, NpyError};
@@ -52,6 +53,8 @@ pub enum MapError {
         shape: Vec<usize>,
     },
 }
+
+failures!(MapError: File { Self::Npy(error) => error.kind(), Self::Raster(error) => error.kind() });
 
 /// Whether the first bytes of a file are those of a NumPy array.
 pub fn is_npy(path: impl AsRef<Path>) -> bool {

@@ -9,6 +9,7 @@
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
+use numeric::failures;
 use serde_json::Value;
 
 use crate::regular::read_regular;
@@ -61,6 +62,8 @@ pub enum PositionsError {
         what: String,
     },
 }
+
+failures!(PositionsError: File);
 
 /// Reads a list of positions.
 ///

@@ -21,6 +21,7 @@
 use std::path::{Path, PathBuf};
 
 use camera::{Pose, Similarity, SimilarityError};
+use numeric::failures;
 use serde::Deserialize;
 
 use crate::regular::read_regular;
@@ -57,6 +58,8 @@ pub enum SimilarityFileError {
         source: SimilarityError,
     },
 }
+
+failures!(SimilarityFileError: File);
 
 /// A defect of the text or of its numbers.
 #[derive(Debug)]

@@ -6,7 +6,7 @@ use camera::{ImageCorrection, Rpc, RpcCamera};
 use io::rpc::RpcReadError;
 use serde::{Deserialize, Serialize};
 
-use numeric::Progress;
+use numeric::{Kind, Progress, failures};
 
 use crate::files::{self, FileError};
 use crate::same_view::carried;
@@ -66,6 +66,8 @@ pub enum CorrectionsError {
         path: PathBuf,
     },
 }
+
+failures!(CorrectionsError: File { Self::NotInRun { .. } => Kind::Input });
 
 /// Finds an image among those that a DSM run used: where it lies, and the pointing correction that
 /// the run found for it (the identity where it found none).

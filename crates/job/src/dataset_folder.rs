@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use io::splat_ply::LocalOrigin;
+use numeric::failures;
 use serde_json::Value;
 
 use crate::files::{self, FileError};
@@ -28,6 +29,8 @@ pub enum DatasetOriginError {
         source: serde_json::Error,
     },
 }
+
+failures!(DatasetOriginError: File { Self::File(error) => error.kind() });
 
 /// Folders below a dataset in which its model and its images are looked for, in depth.
 const DEPTH: usize = 4;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use crs::{CrsError, MapProjection};
 use io::raster::RasterError;
 use io::rpc::RpcReadError;
-use numeric::Cancelled;
+use numeric::{Cancelled, failures};
 
 use crate::corrections::CorrectionsError;
 use crate::files::FileError;
@@ -45,6 +45,13 @@ pub enum JobError {
     Cancelled(#[from] Cancelled),
 }
 
+failures!(JobError: Other {
+    Self::Setting(error) => error.kind(),
+    Self::File(error) => error.kind(),
+    Self::Threads(error) => error.kind(),
+    Self::Cancelled(error) => error.kind(),
+});
+
 /// A setting outside of its range.
 #[derive(Debug, thiserror::Error)]
 #[error("{name} is {found}, expected {expected}")]
@@ -57,6 +64,8 @@ pub struct SettingError {
     /// Values that are accepted.
     pub expected: String,
 }
+
+failures!(SettingError: Input);
 
 impl SettingError {
     /// Makes the error of a setting with the value `found`.
@@ -80,6 +89,12 @@ pub enum ImageInputError {
     Corrections(#[from] CorrectionsError),
 }
 
+failures!(ImageInputError: File {
+    Self::Raster(error) => error.kind(),
+    Self::Rpc(error) => error.kind(),
+    Self::Corrections(error) => error.kind(),
+});
+
 from_steps!(ImageInputError: Rpc(RpcReadError));
 
 /// The coordinate reference system of a file cannot be used.
@@ -93,16 +108,11 @@ pub struct FileCrsError {
     pub source: CrsError,
 }
 
+failures!(FileCrsError: Crs { Self { source, .. } => source.kind() });
+
 impl FileCrsError {
     /// Reads a definition that the file at `path` states.
     pub fn projection(path: &Path, definition: &str) -> Result<MapProjection, Self> {
         MapProjection::from_definition(definition).map_err(|source| Self { path: path.to_owned(), source })
-    }
-}
-
-impl JobError {
-    /// Returns whether an output exists that the configuration does not allow to replace.
-    pub fn is_existing_output(&self) -> bool {
-        matches!(self, Self::File(FileError::Exists { .. }))
     }
 }

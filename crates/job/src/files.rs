@@ -9,6 +9,7 @@ use io::colmap::ColmapError;
 use io::npy::NpyError;
 use io::raster::RasterError;
 use io::splat_ply::SplatPlyError;
+use numeric::{Kind, failures};
 use serde::Serialize;
 
 /// Largest text that a job reads whole: a report, a configuration, an origin, bytes.
@@ -101,6 +102,12 @@ pub enum FileError {
     #[error("cannot write the report as JSON")]
     Json(#[from] serde_json::Error),
 }
+
+failures!(FileError: File {
+    Self::Exists { .. } => Kind::OutputExists,
+    Self::NotUtf8 { .. } => Kind::Input,
+    Self::InUse { .. } => Kind::InUse,
+});
 
 /// Converts the errors of the writers of `io`, which all have a variant for a file that was not
 /// written.

@@ -3,6 +3,7 @@
 use std::path::{Component, Path, PathBuf};
 
 use glob::{Pattern, glob};
+use numeric::failures;
 
 use crate::job_paths::{is_address, resolved};
 
@@ -17,6 +18,8 @@ pub struct ImageFilesError {
     /// Text found and text expected.
     pub what: String,
 }
+
+failures!(ImageFilesError: Input);
 
 /// Returns the images that paths stand for: a file is itself, a pattern (`*`, `?`, `[…]`) the files
 /// that match it, and a folder the images with an RPC that lie in it. Patterns and folders give

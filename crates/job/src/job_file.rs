@@ -7,7 +7,7 @@
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 
-use numeric::nearest_name;
+use numeric::{failures, nearest_name};
 use serde::de::DeserializeOwned;
 
 use crate::files::{FileError, read_text};
@@ -58,6 +58,8 @@ pub enum JobFileError {
         what: String,
     },
 }
+
+failures!(JobFileError: Input { Self::File(error) => error.kind() });
 
 /// Reads a configuration from a job file. `map_paths` replaces each path of the configuration: by
 /// the path with its variables expanded, seen from the folder of the file.

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use crs::{CrsError, HeightConverter, MapProjection, VerticalDatum};
 use io::raster::{Dem, RasterError, read_dem};
 
-use numeric::Progress;
+use numeric::{Progress, failures};
 
 use crate::run_folder::surface_file;
 
@@ -58,6 +58,11 @@ pub enum MapSurfaceError {
         source: CrsError,
     },
 }
+
+failures!(MapSurfaceError: Crs {
+    Self::Raster(error) => error.kind(),
+    Self::Crs { source, .. } | Self::Heights { source, .. } => source.kind(),
+});
 
 /// Reads a surface model, or that of the folder of a DSM run; `stated` overrides the vertical datum
 /// that the file names.

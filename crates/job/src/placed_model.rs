@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use io::colmap::{ColmapError, ColmapModel};
 use io::splat_ply::LocalOrigin;
+use numeric::{Kind, failures};
 
 use crate::dataset_folder::{
     DatasetOriginError, UNKNOWN_DATUM, UNKNOWN_FRAME, dataset_folder, dataset_origin, sparse_folder,
@@ -48,6 +49,12 @@ pub enum PlacedModelError {
         surface: Box<LocalOrigin>,
     },
 }
+
+failures!(PlacedModelError: File {
+    Self::Colmap(error) => error.kind(),
+    Self::Dataset(error) => error.kind(),
+    Self::OtherMap { .. } => Kind::Other,
+});
 
 /// Reads the cameras of a model, or of a dataset with a model in `sparse/0`, and shifts them so
 /// that their positions are relative to `origin`.

@@ -1,5 +1,7 @@
 //! The worker threads of a job.
 
+use numeric::failures;
+
 /// Most worker threads. Each takes memory for its stack.
 const THREADS_MAX: usize = 1024;
 
@@ -25,6 +27,8 @@ pub enum ThreadsError {
         reason: String,
     },
 }
+
+failures!(ThreadsError: Input);
 
 /// Runs `work` on a pool of `threads` workers, or on the caller's pool if no number is given.
 ///

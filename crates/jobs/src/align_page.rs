@@ -13,7 +13,7 @@
 
 use std::path::PathBuf;
 
-use numeric::Progress;
+use numeric::{Failure, Kind, Progress, failures};
 use scenes::align::{AlignJobError, AlignMap, ManualAlign, ManualAlignConfig, ManualAlignReport};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -54,6 +54,8 @@ pub enum AlignPageError {
     #[error(transparent)]
     Align(#[from] AlignJobError),
 }
+
+failures!(AlignPageError: Other { Self::View(error) => error.kind(), Self::Align(error) => error.kind() });
 
 /// What became of a page.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -194,8 +196,7 @@ impl PageJob for Desk {
 /// Words for a save that is refused.
 fn refused(error: &AlignJobError) -> String {
     let text = with_causes(error);
-    let exists = text.contains(io::atomic::OUTPUT_EXISTS);
-    if exists {
+    if error.kind() == Kind::OutputExists {
         format!("{text}. Nothing was written: start the page so that it may overwrite, or with another folder")
     } else {
         text

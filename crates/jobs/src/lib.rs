@@ -12,7 +12,8 @@ pub mod selftest;
 
 pub use dsm::{self, production, products};
 pub use job::{
-    corrections, dataset_folder, error, event_lines, files, image_files, job_file, map_surface, placed_model,
+    corrections, dataset_folder, error, error_text, event_lines, files, image_files, job_file, map_surface,
+    placed_model,
 };
 pub use job::{remote, threads};
 pub use scenes::{align, city, mesh, priors, rpc, simulate, splats, split, train};

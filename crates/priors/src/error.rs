@@ -1,5 +1,7 @@
 //! Why priors cannot be made.
 
+use numeric::failures;
+
 /// Why priors cannot be made.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -77,3 +79,5 @@ pub enum PriorsError {
         object: u32,
     },
 }
+
+failures!(PriorsError: Other { Self::Geodesy(error) => error.kind() });

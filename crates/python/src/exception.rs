@@ -2,10 +2,11 @@
 
 use std::path::Path;
 
+use numeric::Kind;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 
-use crate::fault::{Fault, FaultKind};
+use crate::fault::Fault;
 
 /// Makes the exception of an error.
 pub(crate) fn raise(py: Python<'_>, fault: &Fault) -> PyErr {
@@ -26,16 +27,23 @@ pub(crate) fn raise_about(py: Python<'_>, fault: &Fault, paths: &[&Path]) -> PyE
 fn exception<'py>(py: Python<'py>, fault: &Fault, paths: &[&Path]) -> PyResult<Bound<'py, PyAny>> {
     let errors = py.import("skysweep._errors")?;
     let text = fault.text.as_str();
-    if !matches!(fault.kind, FaultKind::File | FaultKind::OutputExists | FaultKind::InUse) {
-        return errors.getattr(format!("{:?}Error", fault.kind))?.call1((text,));
+    let plain = match fault.kind {
+        Kind::Input => Some("InputError"),
+        Kind::Crs | Kind::GridMissing => Some("CrsError"),
+        Kind::Cancelled => Some("CancelledError"),
+        Kind::File | Kind::RemoteRefused | Kind::OutputExists | Kind::InUse => None,
+        _ => Some("SkysweepError"),
+    };
+    if let Some(class) = plain {
+        return errors.getattr(class)?.call1((text,));
     }
     let named = paths.iter().filter(|path| path.to_str().is_some_and(|path| names(text, path)));
     let path = named.max_by_key(|path| path.as_os_str().len());
     let is_missing = |path: &&&Path| path.symlink_metadata().is_err_and(|e| e.kind() == std::io::ErrorKind::NotFound);
     let code = |name: &str| py.import("errno")?.getattr(name)?.extract::<i32>();
     let (class, code) = match fault.kind {
-        FaultKind::OutputExists => ("OutputExistsError", Some(code("EEXIST")?)),
-        FaultKind::InUse => ("InUseError", Some(code("EBUSY")?)),
+        Kind::OutputExists => ("OutputExistsError", Some(code("EEXIST")?)),
+        Kind::InUse => ("InUseError", Some(code("EBUSY")?)),
         _ if path.as_ref().is_some_and(is_missing) => ("FileMissingError", Some(code("ENOENT")?)),
         _ => ("FileError", fault.system_code),
     };

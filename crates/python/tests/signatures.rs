@@ -24,7 +24,7 @@ use std::path::{Path, PathBuf};
 
 use catalogue::{Fields, JOBS, JobEntry};
 use examples::EXAMPLES;
-use fault::FaultKind;
+use numeric::Kind;
 use serde_json::{Map, Value};
 use syn::{Attribute, Expr, Field, GenericArgument, Item, ItemEnum, ItemStruct, Lit, Meta, PathArguments, Type};
 
@@ -448,7 +448,7 @@ fn settings(entries: &[(&str, Value)]) -> Fields {
     entries.iter().map(|(name, value)| ((*name).to_owned(), value.clone())).collect()
 }
 
-fn refused(job: &str, entries: &[(&str, Value)]) -> (FaultKind, String) {
+fn refused(job: &str, entries: &[(&str, Value)]) -> (Kind, String) {
     let entry = catalogue::job(job).expect("a job");
     let fault = (entry.run)(settings(entries), &numeric::Silent).expect_err("no result");
     (fault.kind, fault.text)
@@ -458,15 +458,12 @@ fn refused(job: &str, entries: &[(&str, Value)]) -> (FaultKind, String) {
 fn wrong_settings_are_named() {
     let two = ("images", Value::from(vec!["a.tif", "b.tif"]));
     let (kind, text) = refused("dsm", &[two.clone(), ("output", "out".into()), ("preset", "slow".into())]);
-    assert_eq!(kind, FaultKind::Input);
+    assert_eq!(kind, Kind::Input);
     assert!(text.starts_with("preset: unknown variant `slow`, expected one of `fast`"), "{text}");
     let (_, text) = refused("dsm", &[two.clone(), ("colour", 1.into())]);
     assert!(text.contains("unknown field `colour`"), "{text}");
     let (kind, text) = refused("dsm", &[two, ("output", "out".into()), ("gsd_m", Value::from(-1.0))]);
-    assert_eq!(
-        (kind, text.as_str()),
-        (FaultKind::Input, "the cell size is -1, expected a positive cell size in metres")
-    );
+    assert_eq!((kind, text.as_str()), (Kind::Input, "the cell size is -1, expected a positive cell size in metres"));
     let (_, text) = refused("classes", &[("surface", "a.tif".into()), ("terrain", serde_json::json!({"sloppy": 1}))]);
     assert!(text.contains("unknown field `sloppy`"), "{text}");
 }
@@ -474,11 +471,11 @@ fn wrong_settings_are_named() {
 #[test]
 fn errors_have_their_class() {
     let (kind, text) = refused("rpc_info", &[("file", "/no/such/file".into())]);
-    assert_eq!(kind, FaultKind::File, "{text}");
+    assert_eq!(kind, Kind::File, "{text}");
     let (kind, text) = refused("read_plan", &[("folder", "/no/such/folder".into())]);
-    assert_eq!(kind, FaultKind::File, "{text}");
+    assert_eq!(kind, Kind::File, "{text}");
     let (kind, text) = refused("simulate", &[("scene", "atlantis".into()), ("output", "out".into())]);
-    assert_eq!(kind, FaultKind::Input, "{text}");
+    assert_eq!(kind, Kind::Input, "{text}");
     let (kind, text) = refused("city_info", &[("file", "/no/such/file".into()), ("lod", "2.2".into())]);
-    assert_eq!(kind, FaultKind::File, "{text}");
+    assert_eq!(kind, Kind::File, "{text}");
 }

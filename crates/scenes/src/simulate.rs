@@ -24,7 +24,7 @@ use io::raster::{
     write_png_gray,
 };
 use io::splat_ply::LocalOrigin;
-use numeric::{Cancelled, Progress};
+use numeric::{Cancelled, Kind, Progress, failures};
 use raster::Grid;
 use serde::{Deserialize, Serialize};
 
@@ -133,6 +133,13 @@ pub enum SimulateJobError {
     #[error(transparent)]
     Job(#[from] JobError),
 }
+
+failures!(SimulateJobError: Other {
+    Self::Scene(_) | Self::Parameters { .. } => Kind::Input,
+    Self::NotEmpty { .. } => Kind::OutputExists,
+    Self::Cameras(error) => error.kind(),
+    Self::Job(error) => error.kind(),
+});
 
 from_steps!(SimulateJobError: Job(FileError, ThreadsError, SettingError, Cancelled));
 

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use job::error::{JobError, from_steps};
 use job::files::{self, FileError};
 use job::report_page;
-use numeric::{Cancelled, Progress};
+use numeric::{Cancelled, Progress, failures};
 
 /// A COLMAP model and the overlaps that are wanted.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -87,6 +87,11 @@ pub enum SplitJobError {
     #[error(transparent)]
     Job(#[from] JobError),
 }
+
+failures!(SplitJobError: Other {
+    Self::Model(error) => error.kind(),
+    Self::Job(error) => error.kind(),
+});
 
 from_steps!(SplitJobError: Job(FileError, Cancelled));
 

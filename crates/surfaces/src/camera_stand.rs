@@ -7,6 +7,7 @@
 use std::path::{Path, PathBuf};
 
 use io::positions::Position;
+use numeric::{Kind, failures};
 use serde::{Deserialize, Serialize};
 
 /// Where the positions of cameras come from.
@@ -99,6 +100,8 @@ pub enum StandError {
         source: serde_json::Error,
     },
 }
+
+failures!(StandError: File { Self::NotFinite { .. } => Kind::Input });
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]

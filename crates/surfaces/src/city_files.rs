@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use city::{CrsReference, MeshConfig, ModelError, TriangleMesh};
 use cityfiles::CityError;
+use numeric::failures;
 
 /// A city model that cannot serve as surface.
 #[derive(Debug, thiserror::Error)]
@@ -25,6 +26,8 @@ pub enum CitySurfaceError {
     #[error(transparent)]
     Triangles(#[from] bvh::BvhError),
 }
+
+failures!(CitySurfaceError: Other { Self::Unreadable(error) => error.kind() });
 
 /// Returns whether a file is a city model, by its ending. The readers look at the content.
 pub(crate) fn is_city_model(path: &Path) -> bool {

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use io::areas::AreaError;
 use io::raster::RasterError;
 use io::splat_ply::SplatPlyError;
+use numeric::{Kind, failures};
 
 use job::error::{JobError, SettingError, from_steps};
 
@@ -99,5 +100,13 @@ pub enum ViewError {
     #[error(transparent)]
     Job(#[from] JobError),
 }
+
+failures!(ViewError: Other {
+    Self::Mesh { .. } => Kind::File,
+    Self::Raster(error) => error.kind(),
+    Self::Vectors(error) => error.kind(),
+    Self::Splats(error) => error.kind(),
+    Self::Job(error) => error.kind(),
+});
 
 from_steps!(ViewError: Job(SettingError));

@@ -3,9 +3,11 @@
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
-use city::{MeshConfig, TriangleMesh};
+use city::{MeshConfig, ModelError, TriangleMesh};
+use cityfiles::CityError;
 use crs::CrsError;
-use priors::{LinesOfSight, ModelPlace, PriorModel, SatelliteMaps, buildings_of};
+use numeric::{Failure, failures};
+use priors::{LinesOfSight, ModelPlace, PriorModel, PriorsError, SatelliteMaps, buildings_of};
 use report::{counted, plain_number};
 use sweep::SweepView;
 
@@ -15,7 +17,31 @@ use crate::planning::grid::DsmGrid;
 use crate::prior::prior_view::ViewPrior;
 use crate::values::MapBounds;
 
-type Cause = Box<dyn std::error::Error + Send + Sync>;
+#[derive(Debug, thiserror::Error)]
+enum Cause {
+    #[error(transparent)]
+    Unreadable(#[from] CityError),
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    #[error(transparent)]
+    Crs(#[from] CrsError),
+    #[error(transparent)]
+    Priors(#[from] PriorsError),
+    #[error("no building of the model has a usable surface")]
+    NothingUsable,
+}
+
+impl Cause {
+    fn about(self, path: &Path) -> DsmError {
+        DsmError::Prior { path: path.to_owned(), kind: self.kind(), source: self.into() }
+    }
+}
+
+failures!(Cause: Other {
+    Self::Unreadable(error) => error.kind(),
+    Self::Crs(error) => error.kind(),
+    Self::Priors(error) => error.kind(),
+});
 
 /// A city model in its map, with heights above the ellipsoid.
 #[derive(Debug)]
@@ -43,14 +69,14 @@ impl CityPrior {
     /// # Errors
     /// [`DsmError::Prior`].
     pub(crate) fn read(path: &Path) -> Result<Self, DsmError> {
-        Self::open(path).map_err(|source| DsmError::Prior { path: path.to_owned(), source })
+        Self::open(path).map_err(|cause| cause.about(path))
     }
 
     fn open(path: &Path) -> Result<Self, Cause> {
         let file = cityfiles::read(path)?;
         let mut mesh = TriangleMesh::from_model(&file.model, &MeshConfig::default())?.mesh;
         if mesh.triangles.is_empty() {
-            return Err("no building of the model has a usable surface".into());
+            return Err(Cause::NothingUsable);
         }
         let place = ModelPlace::of(&file.model.crs, None, None)?;
         place.to_ellipsoid(&mut mesh)?;
@@ -117,7 +143,7 @@ impl CityPrior {
             let maps = SatelliteMaps::render(&self.model, &lines)?;
             Ok((maps.hits() > 0).then_some(ViewPrior { height_m: maps.height_m, object: maps.object, gsd_m }))
         };
-        let all: Result<_, priors::PriorsError> = views.iter().map(seen).collect();
-        all.map_err(|source| DsmError::Prior { path: self.path.clone(), source: source.into() })
+        let all: Result<_, PriorsError> = views.iter().map(seen).collect();
+        all.map_err(|error| Cause::from(error).about(&self.path))
     }
 }

@@ -6,6 +6,7 @@ use crate::DsmError;
 use job::files::FileError;
 use job::job_file::JobFileError;
 use job::threads::ThreadsError;
+use numeric::{Kind, failures};
 
 /// The reason why a planned run ended without a result.
 #[derive(Debug, thiserror::Error)]
@@ -106,6 +107,15 @@ pub enum ProductionError {
         reason: String,
     },
 }
+
+failures!(ProductionError: Other {
+    Self::Dsm(error) => error.kind(),
+    Self::File(error) => error.kind(),
+    Self::Job(error) => error.kind(),
+    Self::Threads(error) => error.kind(),
+    Self::OtherPlan { .. } => Kind::Input,
+    Self::NoPlan { .. } | Self::Plan { .. } => Kind::File,
+});
 
 impl ProductionError {
     /// Returns whether another process has the folder for itself.

@@ -4,9 +4,8 @@ use std::path::PathBuf;
 
 use crs::CrsError;
 use io::raster::RasterError;
-use numeric::Cancelled;
+use numeric::{Cancelled, failures};
 
-use crate::DsmError;
 use job::error::{JobError, SettingError, from_steps};
 use job::files::FileError;
 use job::job_file::JobFileError;
@@ -90,16 +89,17 @@ pub enum ProductsError {
     Job(#[from] JobError),
 }
 
-from_steps!(ProductsError: Job(SettingError, FileError, ThreadsError, Cancelled));
+failures!(ProductsError: Other {
+    Self::Raster(error) => error.kind(),
+    Self::Images(error) => error.kind(),
+    Self::Ortho(error) => error.kind(),
+    Self::Dtm(error) => error.kind(),
+    Self::Classes(error) => error.kind(),
+    Self::Crs(error) => error.kind(),
+    Self::Job(error) => error.kind(),
+});
 
-impl From<ProductsError> for DsmError {
-    fn from(error: ProductsError) -> Self {
-        match error {
-            ProductsError::Job(JobError::Cancelled(_)) => Self::Cancelled,
-            other => Self::Products(Box::new(other)),
-        }
-    }
-}
+from_steps!(ProductsError: Job(SettingError, FileError, ThreadsError, Cancelled));
 
 impl From<OrthoError> for ProductsError {
     fn from(error: OrthoError) -> Self {

@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use numeric::failures;
+
 use crate::atomic::SaveError;
 use crate::camera_file::CameraFileError;
 
@@ -35,3 +37,5 @@ pub enum ColmapError {
     #[error(transparent)]
     NotWritten(#[from] SaveError),
 }
+
+failures!(ColmapError: File { Self::NotWritten(error) => error.kind() });

@@ -10,6 +10,8 @@ mod header;
 
 use std::path::{Path, PathBuf};
 
+use numeric::failures;
+
 use crate::atomic::{SaveError, write_stream};
 use crate::regular::read_regular;
 
@@ -54,6 +56,8 @@ pub enum NpyError {
     #[error(transparent)]
     NotWritten(#[from] SaveError),
 }
+
+failures!(NpyError: File { Self::NotWritten(error) => error.kind() });
 
 /// Writes numbers in C order. `shape` has the lengths of the axes, the slowest first.
 ///

@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use numeric::failures;
+
 /// Why a point cloud was not read.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -66,6 +68,8 @@ pub enum PointsError {
         source: crs::CrsError,
     },
 }
+
+failures!(PointsError: File { Self::Crs { source, .. } => source.kind() });
 
 impl PointsError {
     pub(super) fn damaged(path: &Path, reason: impl ToString) -> Self {

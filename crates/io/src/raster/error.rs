@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use numeric::{Kind, failures};
+
 use super::read::luma_rule::BandChoice;
 use crate::atomic::SaveError;
 use crate::stac::StacError;
@@ -118,6 +120,12 @@ pub enum RasterError {
         source: crs::CrsError,
     },
 }
+
+failures!(RasterError: File {
+    Self::NotLocal { .. } => Kind::RemoteRefused,
+    Self::NotWritten(error) => error.kind(),
+    Self::Crs { source, .. } => source.kind(),
+});
 
 impl RasterError {
     pub(crate) fn unwritable(path: &Path, reason: impl ToString) -> Self {

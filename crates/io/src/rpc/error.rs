@@ -3,6 +3,8 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
+use numeric::failures;
+
 use super::format::RpcFormat;
 use crate::atomic::SaveError;
 
@@ -174,6 +176,8 @@ pub enum RpcReadError {
     },
 }
 
+failures!(RpcReadError: File);
+
 impl RpcReadError {
     pub(super) fn invalid(path: &Path, format: RpcFormat, fault: Fault, tried: Vec<Attempt>) -> Self {
         Self::Invalid { path: path.to_owned(), format, fault: Box::new(fault), tried }
@@ -210,3 +214,5 @@ pub enum RpcWriteError {
     #[error(transparent)]
     NotWritten(#[from] SaveError),
 }
+
+failures!(RpcWriteError: File { Self::NotWritten(error) => error.kind() });

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use gaussian::SplatDefect;
+use numeric::failures;
 
 use crate::atomic::SaveError;
 
@@ -40,6 +41,8 @@ pub enum SplatPlyError {
     #[error(transparent)]
     NotWritten(#[from] SaveError),
 }
+
+failures!(SplatPlyError: File { Self::NotWritten(error) => error.kind() });
 
 pub(crate) fn invalid(path: &Path, what: impl Into<String>) -> SplatPlyError {
     SplatPlyError::Invalid { path: path.to_owned(), what: what.into() }

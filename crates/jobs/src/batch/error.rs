@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use job::files::FileError;
 use job::job_file::JobFileError;
+use numeric::failures;
 
 /// The reason why a batch did not start, or stopped. A task that fails is no error.
 #[derive(Debug, thiserror::Error)]
@@ -83,3 +84,9 @@ pub enum BatchError {
     #[error(transparent)]
     Cancelled(#[from] numeric::Cancelled),
 }
+
+failures!(BatchError: Input {
+    Self::Job(error) => error.kind(),
+    Self::File(error) => error.kind(),
+    Self::Cancelled(error) => error.kind(),
+});

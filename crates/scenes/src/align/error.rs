@@ -8,7 +8,7 @@ use geodesy::GeodesyError;
 use io::colmap::ColmapError;
 use io::control::ControlError;
 use io::raster::RasterError;
-use numeric::Cancelled;
+use numeric::{Cancelled, failures};
 
 use job::error::{JobError, from_steps};
 use job::files::FileError;
@@ -105,5 +105,13 @@ pub enum AlignJobError {
     #[error(transparent)]
     Job(#[from] JobError),
 }
+
+failures!(AlignJobError: Other {
+    Self::Model(error) => error.kind(),
+    Self::Positions(error) => error.kind(),
+    Self::Crs(error) => error.kind(),
+    Self::Picture(error) => error.kind(),
+    Self::Job(error) => error.kind(),
+});
 
 from_steps!(AlignJobError: Job(FileError, Cancelled));

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use city::ModelError;
 use cityfiles::CityError;
-use numeric::Cancelled;
+use numeric::{Cancelled, failures};
 
 use job::error::{JobError, from_steps};
 use job::files::FileError;
@@ -47,6 +47,11 @@ pub enum CityJobError {
     #[error(transparent)]
     Job(#[from] JobError),
 }
+
+failures!(CityJobError: Other {
+    Self::Read(error) => error.kind(),
+    Self::Job(error) => error.kind(),
+});
 
 from_steps!(CityJobError: Job(FileError, Cancelled));
 

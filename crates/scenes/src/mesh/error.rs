@@ -6,7 +6,7 @@ use io::colmap::ColmapError;
 use io::npy::NpyError;
 use io::raster::RasterError;
 use io::splat_ply::SplatPlyError;
-use numeric::Cancelled;
+use numeric::{Cancelled, failures};
 use tsdf::FusionError;
 
 use crate::train::TrainError;
@@ -84,6 +84,16 @@ pub enum MeshJobError {
     #[error(transparent)]
     Job(#[from] JobError),
 }
+
+failures!(MeshJobError: Other {
+    Self::Model(error) => error.kind(),
+    Self::Place(error) => error.kind(),
+    Self::Ply(error) => error.kind(),
+    Self::Map(error) => error.kind(),
+    Self::Image(error) => error.kind(),
+    Self::Comparison(error) => error.kind(),
+    Self::Job(error) => error.kind(),
+});
 
 impl From<TrainError> for MeshJobError {
     fn from(error: TrainError) -> Self {

@@ -13,7 +13,7 @@ use io::npy::NpyError;
 use io::raster::RasterError;
 use io::rpc::RpcReadError;
 use io::similarity::SimilarityFileError;
-use numeric::Cancelled;
+use numeric::{Cancelled, Kind, failures};
 use report::PictureError;
 
 use job::corrections::CorrectionsError;
@@ -260,6 +260,20 @@ pub enum PriorsJobError {
     #[error(transparent)]
     Job(#[from] JobError),
 }
+
+failures!(PriorsJobError: Other {
+    Self::Unlisted { .. } => Kind::File,
+    Self::SatelliteImage { source, .. } => source.kind(),
+    Self::City(error) => error.kind(),
+    Self::Priors(error) | Self::MapUnknown { source: error } => error.kind(),
+    Self::Colmap(error) => error.kind(),
+    Self::Transforms(error) => error.kind(),
+    Self::Transform(error) => error.kind(),
+    Self::Image(error) => error.kind(),
+    Self::Crs(error) => error.kind(),
+    Self::Npy(error) => error.kind(),
+    Self::Job(error) => error.kind(),
+});
 
 from_steps!(PriorsJobError: Job(FileError, ThreadsError, Cancelled), Image(RasterError, RpcReadError, CorrectionsError));
 

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use camera::{CameraError, FitError};
 use io::raster::RasterError;
 use io::rpc::{RpcReadError, RpcWriteError};
+use numeric::{Kind, failures};
 
 use job::corrections::CorrectionsError;
 use job::error::{ImageInputError, JobError, SettingError, from_steps};
@@ -132,6 +133,21 @@ pub enum RpcJobError {
     Cancelled(#[from] numeric::Cancelled),
 }
 
+failures!(RpcJobError: Other {
+    Self::NotEmpty { .. } => Kind::OutputExists,
+    Self::Points { .. } | Self::Output(_) => Kind::File,
+    Self::Line { source, .. } => source.kind(),
+    Self::Read(error) => error.kind(),
+    Self::Write(error) => error.kind(),
+    Self::Corrections(error) => error.kind(),
+    Self::Image(error) => error.kind(),
+    Self::Images(error) => error.kind(),
+    Self::Camera(error) => error.kind(),
+    Self::Text(error) => error.kind(),
+    Self::Job(error) => error.kind(),
+    Self::Cancelled(error) => error.kind(),
+});
+
 from_steps!(RpcJobError: Read(RpcReadError), Job(FileError, SettingError));
 
 /// What is wrong with a line of points.
@@ -160,3 +176,5 @@ pub enum LineFault {
         found: String,
     },
 }
+
+failures!(LineFault: Other { Self::Unreadable(_) => Kind::File });

@@ -12,7 +12,7 @@ use io::raster::RasterError;
 use io::rpc::RpcReadError;
 use io::similarity::SimilarityFileError;
 use io::splat_ply::{LocalOrigin, SplatPlyError};
-use numeric::Cancelled;
+use numeric::{Cancelled, failures};
 
 use job::corrections::CorrectionsError;
 use job::error::{ImageInputError, JobError, SettingError, from_steps};
@@ -153,5 +153,18 @@ pub enum SplatsJobError {
     #[error(transparent)]
     Job(#[from] JobError),
 }
+
+failures!(SplatsJobError: Other {
+    Self::Surface(error) => error.kind(),
+    Self::Confidence(error) => error.kind(),
+    Self::Image(error) => error.kind(),
+    Self::Crs(error) => error.kind(),
+    Self::Ply(error) => error.kind(),
+    Self::Cameras(error) => error.kind(),
+    Self::City(error) => error.kind(),
+    Self::Priors(error) => error.kind(),
+    Self::Transform(error) => error.kind(),
+    Self::Job(error) => error.kind(),
+});
 
 from_steps!(SplatsJobError: Job(FileError, ThreadsError, SettingError, Cancelled), Image(RasterError, RpcReadError, CorrectionsError));

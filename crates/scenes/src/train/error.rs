@@ -10,7 +10,7 @@ use io::npy::NpyError;
 use io::raster::RasterError;
 use io::rpc::RpcReadError;
 use io::splat_ply::SplatPlyError;
-use numeric::Cancelled;
+use numeric::{Cancelled, failures};
 
 use job::corrections::CorrectionsError;
 use job::dataset_folder::DatasetOriginError;
@@ -145,6 +145,18 @@ pub enum TrainError {
     #[error(transparent)]
     Job(#[from] JobError),
 }
+
+failures!(TrainError: Other {
+    Self::Model(error) => error.kind(),
+    Self::Transforms(error) => error.kind(),
+    Self::Map(error) => error.kind(),
+    Self::Image(error) => error.kind(),
+    Self::Surface(error) => error.kind(),
+    Self::Crs(error) => error.kind(),
+    Self::Ply(error) => error.kind(),
+    Self::Origin(error) => error.kind(),
+    Self::Job(error) => error.kind(),
+});
 
 from_steps!(
     TrainError: Job(FileError, ThreadsError, SettingError, Cancelled),

@@ -7,7 +7,7 @@ use camera::CameraError;
 use crs::CrsError;
 use io::raster::RasterError;
 use io::rpc::RpcReadError;
-use numeric::Cancelled;
+use numeric::{Cancelled, failures};
 
 use crate::ortho::OrthoError;
 use job::corrections::CorrectionsError;
@@ -59,6 +59,13 @@ pub enum BuildingMapError {
     #[error(transparent)]
     Job(#[from] JobError),
 }
+
+failures!(BuildingMapError: Other {
+    Self::Image(error) => error.kind(),
+    Self::Crs(error) => error.kind(),
+    Self::Surface(error) => error.kind(),
+    Self::Job(error) => error.kind(),
+});
 
 from_steps!(
     BuildingMapError: Job(SettingError, FileError, ThreadsError, Cancelled),

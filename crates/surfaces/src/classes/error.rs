@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use classes::ClassifyError;
 use io::raster::RasterError;
-use numeric::Cancelled;
+use numeric::{Cancelled, failures};
 use terrain::TerrainError;
 
 use crate::dtm::DtmError;
@@ -78,6 +78,15 @@ pub enum ClassesError {
     #[error(transparent)]
     Job(#[from] JobError),
 }
+
+failures!(ClassesError: Other {
+    Self::Surface(error) => error.kind(),
+    Self::Index(error) => error.kind(),
+    Self::Image(error) => error.kind(),
+    Self::Ortho(error) => error.kind(),
+    Self::Cue(error) => error.kind(),
+    Self::Job(error) => error.kind(),
+});
 
 from_steps!(
     ClassesError: Index(EvalJobError),

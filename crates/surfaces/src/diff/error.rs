@@ -6,7 +6,7 @@ use change::ChangeError;
 use crs::CrsError;
 use eval::EvalError;
 use io::areas::AreaError;
-use numeric::Cancelled;
+use numeric::{Cancelled, failures};
 
 use crate::eval::EvalJobError;
 use job::error::{JobError, from_steps};
@@ -42,5 +42,12 @@ pub enum DiffError {
     #[error(transparent)]
     Job(#[from] JobError),
 }
+
+failures!(DiffError: Other {
+    Self::Surfaces(error) => error.kind(),
+    Self::Areas(error) => error.kind(),
+    Self::Crs(error) => error.kind(),
+    Self::Job(error) => error.kind(),
+});
 
 from_steps!(DiffError: Surfaces(EvalJobError), Job(FileError, ThreadsError, Cancelled));

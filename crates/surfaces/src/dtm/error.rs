@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use crs::CrsError;
 use io::raster::RasterError;
-use numeric::Cancelled;
+use numeric::{Cancelled, failures};
 use terrain::TerrainError;
 
 use job::error::{JobError, from_steps};
@@ -50,6 +50,12 @@ pub enum DtmError {
     #[error(transparent)]
     Job(#[from] JobError),
 }
+
+failures!(DtmError: Other {
+    Self::Surface(error) => error.kind(),
+    Self::Crs(error) => error.kind(),
+    Self::Job(error) => error.kind(),
+});
 
 from_steps!(DtmError: Job(FileError, ThreadsError, Cancelled));
 

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use crs::{CrsError, VerticalDatum};
-use numeric::Cancelled;
+use numeric::{Cancelled, Kind, failures};
 
 use job::error::{FileCrsError, JobError, SettingError, from_steps};
 use job::files::FileError;
@@ -142,5 +142,16 @@ pub enum EvalJobError {
     #[error(transparent)]
     Job(#[from] JobError),
 }
+
+failures!(EvalJobError: Other {
+    Self::ForeignFile { .. } => Kind::OutputExists,
+    Self::Raster(error) => error.kind(),
+    Self::Points(error) => error.kind(),
+    Self::SurfaceFile(error) => error.kind(),
+    Self::MapFile(error) => error.kind(),
+    Self::FileCrs(error) => error.kind(),
+    Self::Crs(error) => error.kind(),
+    Self::Job(error) => error.kind(),
+});
 
 from_steps!(EvalJobError: Job(SettingError, FileError, ThreadsError, Cancelled));

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use crs::CrsError;
-use numeric::Cancelled;
+use numeric::{Cancelled, Kind, failures};
 
 use crate::camera_stand::StandError;
 use crate::city_files::CitySurfaceError;
@@ -107,5 +107,17 @@ pub enum GroundViewError {
     #[error(transparent)]
     Job(#[from] JobError),
 }
+
+failures!(GroundViewError: Other {
+    Self::FolderInUse { .. } => Kind::OutputExists,
+    Self::Stand(error) => error.kind(),
+    Self::Positions(error) => error.kind(),
+    Self::Surface(error) => error.kind(),
+    Self::City(error) => error.kind(),
+    Self::Crs(error) => error.kind(),
+    Self::PlacedModel(error) => error.kind(),
+    Self::Raster(error) => error.kind(),
+    Self::Job(error) => error.kind(),
+});
 
 from_steps!(GroundViewError: Job(SettingError, FileError, ThreadsError, Cancelled));

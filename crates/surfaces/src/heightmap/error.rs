@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use crs::CrsError;
-use numeric::Cancelled;
+use numeric::{Cancelled, Kind, failures};
 
 use crate::camera_stand::StandError;
 use crate::city_files::CitySurfaceError;
@@ -154,5 +154,18 @@ pub enum HeightMapJobError {
     #[error(transparent)]
     Job(#[from] JobError),
 }
+
+failures!(HeightMapJobError: Other {
+    Self::OtherMap { .. } => Kind::OutputExists,
+    Self::Stand(error) => error.kind(),
+    Self::Positions(error) => error.kind(),
+    Self::Raster(error) => error.kind(),
+    Self::City(error) => error.kind(),
+    Self::Points(error) => error.kind(),
+    Self::FileCrs(error) => error.kind(),
+    Self::Crs(error) => error.kind(),
+    Self::Tile(error) => error.kind(),
+    Self::Job(error) => error.kind(),
+});
 
 from_steps!(HeightMapJobError: Job(FileError, ThreadsError, Cancelled));

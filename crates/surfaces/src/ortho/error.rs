@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use crs::CrsError;
 use io::raster::RasterError;
 use io::rpc::RpcReadError;
-use numeric::Cancelled;
+use numeric::{Cancelled, failures};
 
 use job::corrections::CorrectionsError;
 use job::error::{ImageInputError, JobError, SettingError, from_steps};
@@ -92,5 +92,11 @@ pub enum OrthoError {
     #[error(transparent)]
     Job(#[from] JobError),
 }
+
+failures!(OrthoError: Other {
+    Self::Image(error) => error.kind(),
+    Self::Crs(error) => error.kind(),
+    Self::Job(error) => error.kind(),
+});
 
 from_steps!(OrthoError: Job(SettingError, FileError, ThreadsError, Cancelled), Image(RasterError, RpcReadError, CorrectionsError));

@@ -7,7 +7,7 @@ use crs::CrsError;
 use io::raster::RasterError;
 use io::rpc::RpcReadError;
 use io::splat_ply::SplatPlyError;
-use numeric::Cancelled;
+use numeric::{Cancelled, failures};
 
 use crate::ortho::OrthoError;
 use job::corrections::CorrectionsError;
@@ -96,6 +96,15 @@ pub enum RegisterError {
     #[error(transparent)]
     Job(#[from] JobError),
 }
+
+failures!(RegisterError: Other {
+    Self::Surface(error) => error.kind(),
+    Self::Splats(error) => error.kind(),
+    Self::Laid(error) => error.kind(),
+    Self::Image(error) => error.kind(),
+    Self::Crs(error) => error.kind(),
+    Self::Job(error) => error.kind(),
+});
 
 from_steps!(
     RegisterError: Job(SettingError, FileError, ThreadsError, Cancelled),

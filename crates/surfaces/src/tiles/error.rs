@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use io::positions::PositionsError;
 use io::raster::RasterError;
 use io::rpc::RpcReadError;
-use numeric::Cancelled;
+use numeric::{Cancelled, Kind, failures};
 
 use crate::camera_stand::StandError;
 use crate::heightmap::HeightMapJobError;
@@ -53,5 +53,13 @@ pub enum TilesError {
     #[error(transparent)]
     Job(#[from] JobError),
 }
+
+failures!(TilesError: Other {
+    Self::OtherTile { .. } => Kind::OutputExists,
+    Self::Image(error) => error.kind(),
+    Self::Map(error) => error.kind(),
+    Self::Ortho(error) => error.kind(),
+    Self::Job(error) => error.kind(),
+});
 
 from_steps!(TilesError: Job(FileError, ThreadsError, Cancelled), Image(RasterError, RpcReadError, CorrectionsError), Map(StandError, PositionsError));
