@@ -4,7 +4,7 @@
 use std::path::PathBuf;
 
 use crs::VerticalDatum;
-use jobs::buildings::{BuildingMapConfig, BuildingMapError};
+use jobs::buildings::BuildingMapConfig;
 use jobs::error::JobError;
 
 use crate::corrections::corrections_of;
@@ -56,12 +56,10 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
 }
 
 /// Adds the option that helps with an error.
-fn hinted(error: BuildingMapError) -> anyhow::Error {
-    let hint = match &error {
-        BuildingMapError::NoScale { .. } => Some("give --gsd"),
-        BuildingMapError::Job(JobError::Setting(setting)) if setting.name == "the ground sampling distance" => {
-            Some("see --gsd")
-        }
+fn hinted(error: JobError) -> anyhow::Error {
+    let hint = match error.setting() {
+        Some("the scale of the image") => Some("give --gsd"),
+        Some("the ground sampling distance") => Some("see --gsd"),
         _ => None,
     };
     with_hint(error, hint)

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use io::raster::BandChoice;
-use jobs::classes::{ClassesConfig, ClassesError};
+use jobs::classes::ClassesConfig;
 
 use crate::corrections::corrections_of;
 use crate::error::with_hint;
@@ -59,7 +59,7 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
     config.overwrite = args.run.overwrite;
     let show = args.run.show;
     let report = show.watch(global, &args.output, |watcher| jobs::classes::run(&config, watcher)).map_err(|error| {
-        let unnamed = matches!(error, ClassesError::NoIndexBands { .. });
+        let unnamed = error.setting() == Some("the bands of the vegetation index");
         with_hint(error, unnamed.then_some("give --red-band and --nir-band"))
     })?;
     show.print(global, &report, || report.text())?;

@@ -10,9 +10,9 @@ use anyhow::{bail, ensure};
 use city::Lod;
 use crs::VerticalDatum;
 use eval::{AlignmentMethod, EvalConfig, SurfaceComparisonConfig};
+use jobs::error::JobError;
 use jobs::eval::{
-    EvalJobError, EvalKind, EvalRequirements, EvalTarget, GridEvalConfig, MapEvalConfig, MapKind, MinCompleteness,
-    SurfaceEvalConfig,
+    EvalKind, EvalRequirements, EvalTarget, GridEvalConfig, MapEvalConfig, MapKind, MinCompleteness, SurfaceEvalConfig,
 };
 use numeric::Progress;
 
@@ -164,11 +164,7 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
 }
 
 /// Runs a comparison while its progress is shown.
-fn watch<T>(
-    args: &Args,
-    global: Global,
-    job: impl FnOnce(&dyn Progress) -> Result<T, EvalJobError>,
-) -> anyhow::Result<T> {
+fn watch<T>(args: &Args, global: Global, job: impl FnOnce(&dyn Progress) -> Result<T, JobError>) -> anyhow::Result<T> {
     args.show.watch(global, args.output.as_deref().unwrap_or(Path::new("")), job).map_err(hinted)
 }
 
@@ -284,13 +280,13 @@ fn maps(args: &Args, global: Global) -> anyhow::Result<Vec<String>> {
 }
 
 /// Adds the option that helps with an error.
-fn hinted(error: EvalJobError) -> anyhow::Error {
-    let hint = match &error {
-        EvalJobError::DatumUnknown { unknown: "test", .. } => Some("give --test-vertical"),
-        EvalJobError::DatumUnknown { .. } => Some("give --ref-vertical"),
-        EvalJobError::NoEpsgForErrorMap => Some("leave --error-map out"),
-        EvalJobError::MapChannels { .. } => Some("name their kind with --maps"),
-        EvalJobError::Grids(eval::EvalError::SkipWithoutClasses) => Some("give --classes"),
+fn hinted(error: JobError) -> anyhow::Error {
+    let hint = match error.setting() {
+        Some("the vertical datum of the test") => Some("give --test-vertical"),
+        Some("the vertical datum of the reference") => Some("give --ref-vertical"),
+        Some("the error map") => Some("leave --error-map out"),
+        Some("the kind of the maps") => Some("name their kind with --maps"),
+        Some("the classes") => Some("give --classes"),
         _ => None,
     };
     with_hint(error, hint)

@@ -7,10 +7,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use crs::VerticalDatum;
-use jobs::camera_stand::StandError;
-use jobs::city_files::CitySurfaceError;
 use jobs::error::JobError;
-use jobs::groundview::{ComposeConfig, GroundCameras, GroundViewConfig, GroundViewError};
+use jobs::groundview::{ComposeConfig, GroundCameras, GroundViewConfig};
 
 use crate::error::with_hint;
 use crate::interrupt::{self, Interruptible};
@@ -153,20 +151,18 @@ fn compose(args: &ComposeArgs) -> anyhow::Result<Outcome> {
 }
 
 /// Adds the option that helps with an error.
-fn hinted(error: GroundViewError) -> anyhow::Error {
-    let hint = match &error {
-        GroundViewError::NoGround => Some("give --camera-height"),
-        GroundViewError::City(CitySurfaceError::NoSurface { .. }) => Some("skysweep city info tells why"),
-        GroundViewError::PlacedModel(_) => Some("skysweep align brings cameras to a map, --crs names it"),
-        GroundViewError::Stand(StandError::NotFinite { .. }) => {
+fn hinted(error: JobError) -> anyhow::Error {
+    let hint = match error.setting() {
+        Some("the ground under the camera") => Some("give --camera-height"),
+        Some("the city model") => Some("skysweep city info tells why"),
+        Some("the cameras") => Some("skysweep align brings cameras to a map, --crs names it"),
+        Some("the heading" | "the height of the camera" | "the height of the camera above the ground") => {
             Some("see --heading, --ground-offset and --camera-height")
         }
-        GroundViewError::Job(JobError::Setting(setting)) => match setting.name {
-            "the width of a panorama" => Some("see --width"),
-            "the size of a crop" => Some("see --crop-size"),
-            "the field of view" => Some("see --fov"),
-            _ => Some("see --crops"),
-        },
+        Some("the width of a panorama") => Some("see --width"),
+        Some("the size of a crop") => Some("see --crop-size"),
+        Some("the field of view") => Some("see --fov"),
+        Some("the number of crops") => Some("see --crops"),
         _ => None,
     };
     with_hint(error, hint)

@@ -10,12 +10,9 @@ use std::path::{Path, PathBuf};
 use anyhow::bail;
 use city::Lod;
 use crs::{CrsRequest, VerticalDatum};
-use heightmap::{HeightMapError, Reading};
-use jobs::camera_stand::StandError;
-use jobs::city_files::CitySurfaceError;
-use jobs::heightmap::{
-    ConfidenceSource, HeightMapConfig, HeightMapJobError, MapChoice, Normalization, PointAxes, UnprojectConfig,
-};
+use heightmap::Reading;
+use jobs::error::JobError;
+use jobs::heightmap::{ConfidenceSource, HeightMapConfig, MapChoice, Normalization, PointAxes, UnprojectConfig};
 
 use crate::corrections::code_of;
 use crate::error::with_hint;
@@ -200,27 +197,24 @@ fn unproject(args: &UnprojectArgs, global: Global) -> anyhow::Result<Outcome> {
 }
 
 /// Adds the option that helps with an error.
-fn hinted(error: HeightMapJobError) -> anyhow::Error {
+fn hinted(error: JobError) -> anyhow::Error {
     let hint = hint(&error);
     with_hint(error, hint)
 }
 
 /// Returns the option that helps with an error.
-pub(crate) fn hint(error: &HeightMapJobError) -> Option<&'static str> {
-    match error {
-        HeightMapJobError::NoCrs { .. } => Some("give --source-crs"),
-        HeightMapJobError::City(CitySurfaceError::NoSurface { .. }) => Some("skysweep city info tells why"),
-        HeightMapJobError::Stand(StandError::NotFinite { .. }) => {
+pub(crate) fn hint(error: &JobError) -> Option<&'static str> {
+    match error.setting()? {
+        "the coordinate system of the source" => Some("give --source-crs"),
+        "the city model" => Some("skysweep city info tells why"),
+        "the heading" | "the height of the camera" | "the height of the camera above the ground" => {
             Some("see --heading, --ground-offset and --camera-height")
         }
-        HeightMapJobError::Tile(error) => match error {
-            HeightMapError::Bent { .. } => Some("give --crs local"),
-            HeightMapError::NotMetric { .. } => Some("give --crs local, utm or another projected EPSG code"),
-            HeightMapError::NoDatum { .. } => Some("--source-vertical ellipsoid takes the heights as they are"),
-            HeightMapError::NoGround { .. } => Some("give --dtm or --camera-height"),
-            _ => None,
-        },
-        HeightMapJobError::MirroredAxes => Some("give --frame world"),
+        "the bend of the map" => Some("give --crs local"),
+        "the coordinate system of the map" => Some("give --crs local, utm or another projected EPSG code"),
+        "the vertical datum of the source" => Some("--source-vertical ellipsoid takes the heights as they are"),
+        "the ground" => Some("give --dtm or --camera-height"),
+        "the axes of the splats" => Some("give --frame world"),
         _ => None,
     }
 }

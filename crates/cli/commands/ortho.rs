@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use crs::VerticalDatum;
 use jobs::error::JobError;
-use jobs::ortho::{OrthoConfig, OrthoError};
+use jobs::ortho::OrthoConfig;
 use ortho::MosaicRule;
 
 use crate::corrections::corrections_of;
@@ -88,15 +88,12 @@ impl Args {
 }
 
 /// Adds the option that helps with an error.
-fn hinted(error: OrthoError) -> anyhow::Error {
-    let hint = match &error {
-        OrthoError::Balance(_) => Some("give --no-balance"),
-        OrthoError::TooLarge { .. } => Some("give --bounds or a larger --gsd"),
-        OrthoError::Job(JobError::Setting(setting)) => match setting.name {
-            "the cell size" => Some("see --gsd"),
-            "the tolerance" => Some("see --tolerance"),
-            _ => None,
-        },
+fn hinted(error: JobError) -> anyhow::Error {
+    let hint = match error.setting() {
+        Some("the balance of grey values") => Some("give --no-balance"),
+        Some("the area") => Some("give --bounds or a larger --gsd"),
+        Some("the cell size") => Some("see --gsd"),
+        Some("the tolerance") => Some("see --tolerance"),
         _ => None,
     };
     with_hint(error, hint)

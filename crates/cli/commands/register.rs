@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::bail;
 use crs::VerticalDatum;
 use jobs::error::JobError;
-use jobs::register::{RegisterConfig, RegisterError, RegisterModel, RegisterOrder};
+use jobs::register::{RegisterConfig, RegisterModel, RegisterOrder};
 
 use crate::corrections::corrections_of;
 use crate::error::with_hint;
@@ -81,11 +81,10 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
 }
 
 /// Adds the option that helps with an error.
-fn hinted(error: RegisterError) -> anyhow::Error {
-    let hint = match &error {
-        RegisterError::NoImages { .. } => Some("give --images"),
-        RegisterError::TooFew { .. } => Some("see --reach"),
-        RegisterError::Job(JobError::Setting(_)) => Some("see --reach"),
+fn hinted(error: JobError) -> anyhow::Error {
+    let hint = match error.setting() {
+        Some("the images") => Some("give --images"),
+        Some("the reach of the search") => Some("see --reach"),
         _ => None,
     };
     with_hint(error, hint)

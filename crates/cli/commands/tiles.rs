@@ -3,7 +3,8 @@
 
 use std::path::PathBuf;
 
-use jobs::tiles::{TilesConfig, TilesError};
+use jobs::error::JobError;
+use jobs::tiles::TilesConfig;
 use ortho::MosaicRule;
 
 use crate::commands::heightmap::{self, MakeArgs};
@@ -60,11 +61,10 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
 }
 
 /// Adds the option that helps with an error.
-fn hinted(error: TilesError) -> anyhow::Error {
-    let hint = match &error {
-        TilesError::Map(error) => heightmap::hint(error),
-        TilesError::NoImages { .. } => Some("give --images"),
-        _ => None,
+fn hinted(error: JobError) -> anyhow::Error {
+    let hint = match error.setting() {
+        Some("the images") => Some("give --images"),
+        _ => heightmap::hint(&error),
     };
     with_hint(error, hint)
 }

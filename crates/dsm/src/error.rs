@@ -3,13 +3,13 @@
 use std::fmt;
 use std::path::PathBuf;
 
-use numeric::{Kind, failures};
+use numeric::{Failure, Kind, failures};
 use report::plain_number;
 
 use crate::products::ProductsError;
 use crate::values::{HeightRange, MapBounds};
 use job::corrections::CorrectionsError;
-use job::error::{JobError, from_steps};
+use job::error::from_steps;
 use job::files::FileError;
 use job::threads::ThreadsError;
 
@@ -441,7 +441,7 @@ impl From<numeric::Cancelled> for DsmError {
 impl From<ProductsError> for DsmError {
     fn from(error: ProductsError) -> Self {
         match error {
-            ProductsError::Job(JobError::Cancelled(_)) => Self::Cancelled,
+            error if error.kind() == Kind::Cancelled => Self::Cancelled,
             other => Self::Products(Box::new(other)),
         }
     }

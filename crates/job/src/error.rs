@@ -1,11 +1,13 @@
 //! The reasons that can end every job, and how the error of a job takes in the errors of its steps.
 
+use std::error::Error;
+use std::fmt;
 use std::path::{Path, PathBuf};
 
 use crs::{CrsError, MapProjection};
 use io::raster::RasterError;
 use io::rpc::RpcReadError;
-use numeric::{Cancelled, failures};
+use numeric::{Cancelled, Failure, Kind, failures};
 
 use crate::corrections::CorrectionsError;
 use crate::files::FileError;
@@ -27,30 +29,105 @@ macro_rules! from_steps {
 
 pub use crate::from_steps;
 
-/// A reason that can end any job.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum JobError {
-    /// A setting is outside of its range.
-    #[error(transparent)]
-    Setting(#[from] SettingError),
-    /// A file cannot be read, or an output exists or cannot be written.
-    #[error(transparent)]
-    File(#[from] FileError),
-    /// The worker threads cannot be started.
-    #[error(transparent)]
-    Threads(#[from] ThreadsError),
-    /// The job was cancelled.
-    #[error(transparent)]
-    Cancelled(#[from] Cancelled),
+/// Makes the error that the steps of a job pass to each other into the [`JobError`] that the job
+/// returns. Variants that are about a setting or an input can name it.
+#[macro_export]
+macro_rules! job_errors {
+    ($($error:ident $({ $($variant:pat => $setting:expr),+ $(,)? })?),+ $(,)?) => {$(
+        impl From<$error> for $crate::error::JobError {
+            fn from(error: $error) -> Self {
+                let setting = error.setting();
+                Self::new(error).about(setting)
+            }
+        }
+
+        impl $error {
+            /// Returns the setting or the input that the error is about, in words.
+            pub(crate) fn setting(&self) -> Option<&'static str> {
+                match self {
+                    Self::Job(error) => error.setting(),
+                    $($($variant => $setting,)+)?
+                    _ => None,
+                }
+            }
+        }
+    )+};
 }
 
-failures!(JobError: Other {
-    Self::Setting(error) => error.kind(),
-    Self::File(error) => error.kind(),
-    Self::Threads(error) => error.kind(),
-    Self::Cancelled(error) => error.kind(),
-});
+pub use crate::job_errors;
+
+/// Why a job ended without a result.
+///
+/// Its text and its causes are those of the step that failed. Callers that react to it match the
+/// [`kind`](Failure::kind) and the [`setting`](Self::setting).
+#[derive(Debug)]
+pub struct JobError {
+    kind: Kind,
+    setting: Option<&'static str>,
+    step: Box<dyn Error + Send + Sync>,
+}
+
+impl JobError {
+    /// Makes the error of a job of the error of a step.
+    pub fn new(step: impl Failure + Send + Sync + 'static) -> Self {
+        Self { kind: step.kind(), setting: None, step: step.into() }
+    }
+
+    /// Names the setting or the input that the error is about, in words.
+    #[must_use]
+    pub fn about(self, setting: Option<&'static str>) -> Self {
+        Self { setting, ..self }
+    }
+
+    /// Returns the setting or the input that the error is about, in words, such as "the cell size";
+    /// `None` where it is about none, or where no caller has asked for it yet.
+    pub fn setting(&self) -> Option<&'static str> {
+        self.setting
+    }
+
+    /// Returns the error of the step that failed.
+    pub fn step(&self) -> &(dyn Error + Send + Sync + 'static) {
+        &*self.step
+    }
+}
+
+impl fmt::Display for JobError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.step.fmt(f)
+    }
+}
+
+impl Error for JobError {
+    fn source(&self) -> Option<&(dyn Error + 'static)> {
+        self.step.source()
+    }
+}
+
+impl Failure for JobError {
+    fn kind(&self) -> Kind {
+        self.kind
+    }
+}
+
+impl From<SettingError> for JobError {
+    fn from(error: SettingError) -> Self {
+        let name = error.name;
+        Self::new(error).about(Some(name))
+    }
+}
+
+/// Takes in the errors of steps that are alike in every job.
+macro_rules! from_failures {
+    ($($error:ty),+ $(,)?) => {$(
+        impl From<$error> for JobError {
+            fn from(error: $error) -> Self {
+                Self::new(error)
+            }
+        }
+    )+};
+}
+
+from_failures!(FileError, ThreadsError, Cancelled, RasterError, CrsError);
 
 /// A setting outside of its range.
 #[derive(Debug, thiserror::Error)]

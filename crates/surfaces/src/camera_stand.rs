@@ -7,8 +7,10 @@
 use std::path::{Path, PathBuf};
 
 use io::positions::Position;
-use numeric::{Kind, failures};
+use numeric::failures;
 use serde::{Deserialize, Serialize};
+
+use job::error::{JobError, SettingError};
 
 /// Where the positions of cameras come from.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -66,20 +68,9 @@ pub(crate) enum Cameras<'a> {
     List(&'a Path),
 }
 
-/// A camera position that cannot be used.
+/// A camera file that cannot be used.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum StandError {
-    /// A setting is not finite.
-    #[error("{name} is {found}, expected {expected}")]
-    NotFinite {
-        /// Name of the setting in words.
-        name: &'static str,
-        /// Value that was given.
-        found: f64,
-        /// Unit that is expected.
-        expected: &'static str,
-    },
+pub(crate) enum StandError {
     /// The camera file cannot be read.
     #[error("cannot read the camera file ({source}): {}", path.display())]
     Unreadable {
@@ -101,7 +92,7 @@ pub enum StandError {
     },
 }
 
-failures!(StandError: File { Self::NotFinite { .. } => Kind::Input });
+failures!(StandError: File);
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -121,8 +112,8 @@ impl StandConfig {
     /// Checks that all numbers are finite.
     ///
     /// # Errors
-    /// [`StandError::NotFinite`].
-    pub fn validate(&self) -> Result<(), StandError> {
+    /// [`JobError`] that names the setting.
+    pub fn validate(&self) -> Result<(), JobError> {
         let numbers = [
             ("the height of the camera above the ground", Some(self.ground_offset_m), "metres"),
             ("the height of the camera", self.height_m, "metres"),
@@ -130,7 +121,7 @@ impl StandConfig {
         ];
         for (name, found, expected) in numbers {
             if let Some(found) = found.filter(|found| !found.is_finite()) {
-                return Err(StandError::NotFinite { name, found, expected });
+                return Err(SettingError::new(name, found, expected).into());
             }
         }
         Ok(())

@@ -8,8 +8,7 @@ use numeric::failures;
 
 /// A city model that cannot serve as surface.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum CitySurfaceError {
+pub(crate) enum CitySurfaceError {
     /// The city model cannot be read.
     #[error(transparent)]
     Unreadable(#[from] CityError),

@@ -4,15 +4,12 @@ use std::path::PathBuf;
 
 use crs::CrsError;
 use io::raster::RasterError;
-use numeric::{Cancelled, failures};
+use numeric::{Cancelled, Failure, Kind, failures};
 
 use job::error::{JobError, SettingError, from_steps};
 use job::files::FileError;
 use job::job_file::JobFileError;
 use job::threads::ThreadsError;
-use surfaces::classes::ClassesError;
-use surfaces::dtm::DtmError;
-use surfaces::ortho::OrthoError;
 
 /// Products that cannot be made.
 #[derive(Debug, thiserror::Error)]
@@ -74,13 +71,13 @@ pub enum ProductsError {
     Images(#[source] Box<JobFileError>),
     /// The ortho cannot be made.
     #[error("cannot make the ortho that colours the products; an ortho can be given instead")]
-    Ortho(#[source] Box<OrthoError>),
+    Ortho(#[source] Box<JobError>),
     /// The terrain model cannot be made.
     #[error("cannot make the terrain model")]
-    Dtm(#[source] Box<DtmError>),
+    Dtm(#[source] Box<JobError>),
     /// The classes cannot be found.
     #[error("cannot find the classes of the surface model")]
-    Classes(#[source] Box<ClassesError>),
+    Classes(#[source] Box<JobError>),
     /// The coordinate reference system cannot be used.
     #[error(transparent)]
     Crs(#[from] CrsError),
@@ -101,29 +98,10 @@ failures!(ProductsError: Other {
 
 from_steps!(ProductsError: Job(SettingError, FileError, ThreadsError, Cancelled));
 
-impl From<OrthoError> for ProductsError {
-    fn from(error: OrthoError) -> Self {
-        match error {
-            OrthoError::Job(error @ JobError::Cancelled(_)) => Self::Job(error),
-            other => Self::Ortho(Box::new(other)),
-        }
-    }
-}
-
-impl From<ClassesError> for ProductsError {
-    fn from(error: ClassesError) -> Self {
-        match error {
-            ClassesError::Job(error @ JobError::Cancelled(_)) => Self::Job(error),
-            other => Self::Classes(Box::new(other)),
-        }
-    }
-}
-
-impl From<DtmError> for ProductsError {
-    fn from(error: DtmError) -> Self {
-        match error {
-            DtmError::Job(error @ JobError::Cancelled(_)) => Self::Job(error),
-            other => Self::Dtm(Box::new(other)),
-        }
+impl ProductsError {
+    /// Takes the error of the job that makes a product. A job that was cancelled is wrapped in
+    /// nothing.
+    pub(super) fn of(error: JobError, wrapped: fn(Box<JobError>) -> Self) -> Self {
+        if error.kind() == Kind::Cancelled { Self::Job(error) } else { wrapped(Box::new(error)) }
     }
 }

@@ -89,7 +89,8 @@ fn make(config: &ProductsConfig, output: &Path, progress: &dyn Progress) -> Resu
         let mut of = ClassesConfig::new(config.run.clone(), output.join(CLASSES));
         of.overwrite = config.overwrite;
         of.multispectral = multispectral(&config.run);
-        report.classes = Some(classes::run(&of, progress)?);
+        report.classes =
+            Some(classes::run(&of, progress).map_err(|error| ProductsError::of(error, ProductsError::Classes))?);
     }
     if config.wants(ProductKind::Contours) {
         let (dtm, interval) = (output.join(DTM_HEIGHTS), config.contour_interval);
@@ -168,7 +169,7 @@ fn multispectral(run: &Path) -> Vec<PathBuf> {
 fn terrain(config: &ProductsConfig, output: &Path, progress: &dyn Progress) -> Result<DtmReport, ProductsError> {
     let mut of = DtmConfig::new(config.run.clone(), output.join(DTM));
     of.overwrite = config.overwrite;
-    Ok(dtm::run(&of, progress)?)
+    dtm::run(&of, progress).map_err(|error| ProductsError::of(error, ProductsError::Dtm))
 }
 
 /// Returns the ortho that was given or that an earlier call made, or makes one.
@@ -183,6 +184,6 @@ fn ortho_file(config: &ProductsConfig, output: &Path, progress: &dyn Progress) -
     let settings = read_dsm_job(&config.run.join(SETTINGS)).map_err(|error| ProductsError::Images(Box::new(error)))?;
     let mut of = OrthoConfig::new(settings.images, config.run.clone(), made.clone());
     of.overwrite = config.overwrite;
-    ortho::run(&of, progress)?;
+    ortho::run(&of, progress).map_err(|error| ProductsError::of(error, ProductsError::Ortho))?;
     Ok(made)
 }

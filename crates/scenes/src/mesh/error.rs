@@ -13,7 +13,6 @@ use crate::train::TrainError;
 use job::error::{JobError, SettingError, from_steps};
 use job::files::FileError;
 use job::threads::ThreadsError;
-use surfaces::eval::EvalJobError;
 
 /// A mesh that is not made.
 #[derive(Debug, thiserror::Error)]
@@ -79,7 +78,7 @@ pub enum MeshJobError {
     },
     /// The mesh cannot be compared with the reference.
     #[error("the mesh is written, but cannot be compared with the reference")]
-    Comparison(#[source] Box<EvalJobError>),
+    Comparison(#[source] Box<JobError>),
     /// A setting, a file or the threads cannot be used, or the job was cancelled.
     #[error(transparent)]
     Job(#[from] JobError),

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::error::BuildingMapError;
 use job::corrections::CorrectionSource;
-use job::error::SettingError;
+use job::error::{JobError, SettingError};
 
 /// A building index of one image.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -62,13 +62,13 @@ impl BuildingMapConfig {
     /// Checks the settings that can be judged without opening a file.
     ///
     /// # Errors
-    /// [`BuildingMapError`] for a number outside of its range.
-    pub fn validate(&self) -> Result<(), BuildingMapError> {
+    /// [`JobError`] for a number outside of its range.
+    pub fn validate(&self) -> Result<(), JobError> {
         if let Some(gsd) = self.gsd_m.filter(|gsd| !(*gsd > 0.0 && gsd.is_finite())) {
             let expected = "a positive number of metres";
             return Err(SettingError::new("the ground sampling distance", gsd, expected).into());
         }
-        Ok(self.index.validate()?)
+        Ok(self.index.validate().map_err(BuildingMapError::from)?)
     }
 
     /// Returns the file of the report.

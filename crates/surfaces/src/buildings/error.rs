@@ -11,14 +11,13 @@ use numeric::{Cancelled, failures};
 
 use crate::ortho::OrthoError;
 use job::corrections::CorrectionsError;
-use job::error::{ImageInputError, JobError, SettingError, from_steps};
+use job::error::{ImageInputError, JobError, SettingError, from_steps, job_errors};
 use job::files::FileError;
 use job::threads::ThreadsError;
 
 /// A building index that cannot be made.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum BuildingMapError {
+pub(crate) enum BuildingMapError {
     /// The image cannot be read.
     #[error(transparent)]
     Image(#[from] ImageInputError),
@@ -65,6 +64,11 @@ failures!(BuildingMapError: Other {
     Self::Crs(error) => error.kind(),
     Self::Surface(error) => error.kind(),
     Self::Job(error) => error.kind(),
+});
+
+job_errors!(BuildingMapError {
+    Self::NoScale { .. } => Some("the scale of the image"),
+    Self::Surface(error) => error.setting(),
 });
 
 from_steps!(

@@ -13,6 +13,5 @@ mod report;
 mod run;
 
 pub use config::BuildingMapConfig;
-pub use error::BuildingMapError;
 pub use report::BuildingMapReport;
 pub use run::run;

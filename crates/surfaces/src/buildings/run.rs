@@ -10,6 +10,7 @@ use super::error::BuildingMapError;
 use super::input::Input;
 use super::output::Placed;
 use super::report::BuildingMapReport;
+use job::error::JobError;
 use job::files::FileError;
 use job::run_folder::surface_file;
 use job::{files, report_page, threads};
@@ -20,7 +21,7 @@ const HIGH: f32 = 0.5;
 /// Makes the building index of an image and writes it with a report.
 ///
 /// # Errors
-/// [`BuildingMapError`]: an image that cannot be read or does not tell the size of its pixels, a
+/// [`JobError`]: an image that cannot be read or does not tell the size of its pixels, a
 /// surface model that it does not see, outputs that exist.
 ///
 /// ```
@@ -34,7 +35,11 @@ const HIGH: f32 = 0.5;
 /// assert!(report.junctions > 0 && report.cells_known > report.cells_high);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn run(config: &BuildingMapConfig, progress: &dyn Progress) -> Result<BuildingMapReport, BuildingMapError> {
+pub fn run(config: &BuildingMapConfig, progress: &dyn Progress) -> Result<BuildingMapReport, JobError> {
+    Ok(steps(config, progress)?)
+}
+
+fn steps(config: &BuildingMapConfig, progress: &dyn Progress) -> Result<BuildingMapReport, BuildingMapError> {
     config.validate()?;
     files::check_raster_destination(&config.output, config.overwrite)?;
     let style = config.output.with_extension("qml");

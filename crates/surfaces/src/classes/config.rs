@@ -9,7 +9,7 @@ use terrain::GroundConfig;
 
 use super::error::ClassesError;
 use job::corrections::CorrectionSource;
-use job::error::SettingError;
+use job::error::{JobError, SettingError};
 
 /// Classes of a surface model.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -74,14 +74,14 @@ impl ClassesConfig {
     /// Checks the settings that can be judged without opening a file.
     ///
     /// # Errors
-    /// [`ClassesError::Terrain`] and [`ClassesError::Classify`] for parameters outside of their
-    /// range; [`ClassesError::Job`] for both a vegetation index and images to make one of.
-    pub fn validate(&self) -> Result<(), ClassesError> {
+    /// [`JobError`] for parameters outside of their range, and for both a vegetation index and
+    /// images to make one of.
+    pub fn validate(&self) -> Result<(), JobError> {
         if self.vegetation_index.is_some() && !self.multispectral.is_empty() {
             let expected = "either a vegetation index or multispectral images";
             return Err(SettingError::new("the source of the vegetation index", "given twice", expected).into());
         }
-        self.terrain.validate()?;
-        Ok(self.classes.validate()?)
+        self.terrain.validate().map_err(ClassesError::from)?;
+        Ok(self.classes.validate().map_err(ClassesError::from)?)
     }
 }

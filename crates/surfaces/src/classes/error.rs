@@ -11,14 +11,13 @@ use crate::dtm::DtmError;
 use crate::eval::EvalJobError;
 use crate::ortho::OrthoError;
 use job::corrections::CorrectionsError;
-use job::error::{ImageInputError, JobError, SettingError, from_steps};
+use job::error::{ImageInputError, JobError, SettingError, from_steps, job_errors};
 use job::files::FileError;
 use job::threads::ThreadsError;
 
 /// A class raster that cannot be made.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum ClassesError {
+pub(crate) enum ClassesError {
     /// The surface model cannot be used.
     #[error(transparent)]
     Surface(#[from] DtmError),
@@ -86,6 +85,10 @@ failures!(ClassesError: Other {
     Self::Ortho(error) => error.kind(),
     Self::Cue(error) => error.kind(),
     Self::Job(error) => error.kind(),
+});
+
+job_errors!(ClassesError {
+    Self::NoIndexBands { .. } => Some("the bands of the vegetation index"),
 });
 
 from_steps!(

@@ -20,7 +20,6 @@ mod report;
 mod run;
 
 pub use config::ClassesConfig;
-pub use error::ClassesError;
 pub use layers::ClassLayers;
 pub use multispectral::IndexImage;
 pub use report::ClassesReport;

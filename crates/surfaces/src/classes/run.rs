@@ -20,6 +20,7 @@ use super::report::ClassesReport;
 use crate::dtm::{self, DtmConfig};
 use crate::eval::EvalJobError;
 use crate::eval::on_reference::surface_on_reference;
+use job::error::JobError;
 use job::files::{self, FileError};
 use job::output_folder::OutputFolder;
 use job::report_page;
@@ -45,7 +46,7 @@ const LEAST_GROUND: f64 = 0.05;
 /// Finds ground, buildings and vegetation of a surface model, and writes them with a report.
 ///
 /// # Errors
-/// [`ClassesError`]: a surface that cannot be read, is not on a map in metres or shows no ground,
+/// [`JobError`]: a surface that cannot be read, is not on a map in metres or shows no ground,
 /// outputs that exist.
 ///
 /// ```
@@ -59,7 +60,11 @@ const LEAST_GROUND: f64 = 0.05;
 /// assert!(report.cells_building > report.cells_vegetation && report.cells_unknown == 0);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn run(config: &ClassesConfig, progress: &dyn Progress) -> Result<ClassesReport, ClassesError> {
+pub fn run(config: &ClassesConfig, progress: &dyn Progress) -> Result<ClassesReport, JobError> {
+    Ok(steps(config, progress)?)
+}
+
+fn steps(config: &ClassesConfig, progress: &dyn Progress) -> Result<ClassesReport, ClassesError> {
     config.validate()?;
     for name in FILES {
         files::refuse_existing(&config.output.join(name), config.overwrite)?;

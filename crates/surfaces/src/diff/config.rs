@@ -92,15 +92,15 @@ impl DiffConfig {
     /// Checks the settings that can be judged without opening a file.
     ///
     /// # Errors
-    /// [`DiffError::Change`] for a parameter of the search, [`DiffError::Job`] for a standard
-    /// deviation that is not positive.
-    pub fn validate(&self) -> Result<(), DiffError> {
-        self.change.validate()?;
+    /// [`JobError`] for a parameter of the search, and for a standard deviation that is not
+    /// positive.
+    pub fn validate(&self) -> Result<(), JobError> {
+        self.change.validate().map_err(DiffError::from)?;
         match self.sigma_m {
             Some(sigma) if !(sigma.is_finite() && sigma > 0.0) => {
                 let error =
                     SettingError::new("the standard deviation of the heights", sigma, "a positive number of metres");
-                Err(DiffError::Job(JobError::Setting(error)))
+                Err(error.into())
             }
             _ => Ok(()),
         }

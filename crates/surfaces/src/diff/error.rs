@@ -9,14 +9,13 @@ use io::areas::AreaError;
 use numeric::{Cancelled, failures};
 
 use crate::eval::EvalJobError;
-use job::error::{JobError, from_steps};
+use job::error::{JobError, from_steps, job_errors};
 use job::files::FileError;
 use job::threads::ThreadsError;
 
 /// A change that cannot be measured.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum DiffError {
+pub(crate) enum DiffError {
     /// The surfaces cannot be read or brought together.
     #[error("cannot compare the second surface (test) with the first (reference)")]
     Surfaces(#[source] Box<EvalJobError>),
@@ -49,5 +48,7 @@ failures!(DiffError: Other {
     Self::Crs(error) => error.kind(),
     Self::Job(error) => error.kind(),
 });
+
+job_errors!(DiffError);
 
 from_steps!(DiffError: Surfaces(EvalJobError), Job(FileError, ThreadsError, Cancelled));

@@ -24,6 +24,5 @@ mod report;
 mod run;
 
 pub use config::DiffConfig;
-pub use error::DiffError;
 pub use report::{AreaVolume, DiffBlocks, DiffRegion, DiffReport};
 pub use run::run;

@@ -15,6 +15,7 @@ use super::error::DiffError;
 use super::layers::{of_areas, of_regions};
 use super::page;
 use super::report::{DiffBlocks, DiffRegion, DiffReport};
+use job::error::JobError;
 use job::files::{self, FileError};
 use job::output_folder::OutputFolder;
 use job::report_page;
@@ -46,7 +47,7 @@ const OVERREACH_SIGMA_CELLS: f64 = 0.4;
 /// Finds what changed between two surface models, and writes rasters, polygons and a report.
 ///
 /// # Errors
-/// [`DiffError`]: surfaces that cannot be read or brought together, polygons that cannot be read,
+/// [`JobError`]: surfaces that cannot be read or brought together, polygons that cannot be read,
 /// outputs that exist.
 ///
 /// ```
@@ -61,7 +62,11 @@ const OVERREACH_SIGMA_CELLS: f64 = 0.4;
 /// assert!(report.regions.is_empty() && report.total.net_m3.abs() < 1.0);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn run(config: &DiffConfig, progress: &dyn Progress) -> Result<DiffReport, DiffError> {
+pub fn run(config: &DiffConfig, progress: &dyn Progress) -> Result<DiffReport, JobError> {
+    Ok(steps(config, progress)?)
+}
+
+fn steps(config: &DiffConfig, progress: &dyn Progress) -> Result<DiffReport, DiffError> {
     config.validate()?;
     for name in FILES {
         files::refuse_existing(&config.output.join(name), config.overwrite)?;

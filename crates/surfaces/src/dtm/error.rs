@@ -7,14 +7,13 @@ use io::raster::RasterError;
 use numeric::{Cancelled, failures};
 use terrain::TerrainError;
 
-use job::error::{JobError, from_steps};
+use job::error::{JobError, from_steps, job_errors};
 use job::files::FileError;
 use job::threads::ThreadsError;
 
 /// A terrain model that cannot be made.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum DtmError {
+pub(crate) enum DtmError {
     /// The surface model cannot be read.
     #[error(transparent)]
     Surface(#[from] RasterError),
@@ -56,6 +55,8 @@ failures!(DtmError: Other {
     Self::Crs(error) => error.kind(),
     Self::Job(error) => error.kind(),
 });
+
+job_errors!(DtmError);
 
 from_steps!(DtmError: Job(FileError, ThreadsError, Cancelled));
 

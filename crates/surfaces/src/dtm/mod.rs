@@ -21,7 +21,7 @@ mod report;
 mod run;
 
 pub use config::DtmConfig;
-pub use error::DtmError;
+pub(crate) use error::DtmError;
 pub use layers::SurfaceLayers;
 pub(crate) use layers::unobserved;
 pub use report::DtmReport;

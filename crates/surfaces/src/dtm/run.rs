@@ -11,6 +11,7 @@ use super::config::DtmConfig;
 use super::error::DtmError;
 use super::layers::unobserved;
 use super::report::DtmReport;
+use job::error::JobError;
 use job::files::{self, FileError};
 use job::output_folder::OutputFolder;
 use job::report_page;
@@ -37,7 +38,7 @@ const LEAST_GROUND: f64 = 0.05;
 /// Makes a terrain model, the heights above it and a mask, and writes them with a report.
 ///
 /// # Errors
-/// [`DtmError`]: a surface that cannot be read or is not on a map in metres, outputs that exist.
+/// [`JobError`]: a surface that cannot be read or is not on a map in metres, outputs that exist.
 ///
 /// ```
 /// use surfaces::dtm::{DtmConfig, run};
@@ -50,7 +51,11 @@ const LEAST_GROUND: f64 = 0.05;
 /// assert!(report.cells_ground > report.cells_under_objects && report.cells_unknown == 0);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn run(config: &DtmConfig, progress: &dyn Progress) -> Result<DtmReport, DtmError> {
+pub fn run(config: &DtmConfig, progress: &dyn Progress) -> Result<DtmReport, JobError> {
+    Ok(steps(config, progress)?)
+}
+
+fn steps(config: &DtmConfig, progress: &dyn Progress) -> Result<DtmReport, DtmError> {
     config.validate()?;
     for name in FILES {
         files::refuse_existing(&config.output.join(name), config.overwrite)?;

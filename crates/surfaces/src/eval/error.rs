@@ -5,14 +5,13 @@ use std::path::PathBuf;
 use crs::{CrsError, VerticalDatum};
 use numeric::{Cancelled, Kind, failures};
 
-use job::error::{FileCrsError, JobError, SettingError, from_steps};
+use job::error::{FileCrsError, JobError, SettingError, from_steps, job_errors};
 use job::files::FileError;
 use job::threads::ThreadsError;
 
 /// An evaluation that cannot be made.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum EvalJobError {
+pub(crate) enum EvalJobError {
     /// A raster cannot be read.
     #[error(transparent)]
     Raster(#[from] io::raster::RasterError),
@@ -152,6 +151,14 @@ failures!(EvalJobError: Other {
     Self::FileCrs(error) => error.kind(),
     Self::Crs(error) => error.kind(),
     Self::Job(error) => error.kind(),
+});
+
+job_errors!(EvalJobError {
+    Self::DatumUnknown { unknown: "test", .. } => Some("the vertical datum of the test"),
+    Self::DatumUnknown { .. } => Some("the vertical datum of the reference"),
+    Self::NoEpsgForErrorMap => Some("the error map"),
+    Self::MapChannels { .. } => Some("the kind of the maps"),
+    Self::Grids(eval::EvalError::SkipWithoutClasses) => Some("the classes"),
 });
 
 from_steps!(EvalJobError: Job(SettingError, FileError, ThreadsError, Cancelled));

@@ -6,8 +6,8 @@ use crs::VerticalDatum;
 use eval::{AlignmentMethod, EvalConfig};
 use serde::{Deserialize, Serialize};
 
-use super::error::EvalJobError;
 use super::requirements::EvalRequirements;
+use job::error::JobError;
 use job::run_folder::surface_file;
 
 /// Folder of the report.
@@ -117,9 +117,9 @@ impl GridEvalConfig {
     /// Checks the settings that can be judged without opening a file.
     ///
     /// # Errors
-    /// [`EvalJobError::Job`] for a number outside of its range.
-    pub fn validate(&self) -> Result<(), EvalJobError> {
-        self.requirements.validate()
+    /// [`JobError`] for a number outside of its range.
+    pub fn validate(&self) -> Result<(), JobError> {
+        Ok(self.requirements.validate()?)
     }
 
     /// Returns the settings of the comparison itself. A height with an absolute error below

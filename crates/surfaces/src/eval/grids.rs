@@ -17,6 +17,7 @@ use super::grid_output;
 use super::on_reference::metres_per_unit;
 use super::requirements::EvalRequirements;
 use super::surface_doubts::offset_cause;
+use job::error::JobError;
 use job::threads;
 
 /// Below this ratio of the NMADs at the edge and at the middle of the search, the NMAD hardly
@@ -51,7 +52,7 @@ pub struct GridEvalReport {
 /// Compares two height grids and writes what the configuration asks for.
 ///
 /// # Errors
-/// [`EvalJobError`]: files that cannot be read or compared, unknown vertical datums, outputs that
+/// [`JobError`]: files that cannot be read or compared, unknown vertical datums, outputs that
 /// exist.
 ///
 /// ```
@@ -65,12 +66,12 @@ pub struct GridEvalReport {
 /// config.target = EvalTarget::Nowhere;
 /// let report = compare_grids(&config, &Silent)?;
 /// assert_eq!(report.evaluation.overall.errors.map(|errors| errors.mae), Some(0.0));
-/// # Ok::<(), surfaces::eval::EvalJobError>(())
+/// # Ok::<(), job::error::JobError>(())
 /// ```
-pub fn compare_grids(config: &GridEvalConfig, progress: &dyn Progress) -> Result<GridEvalReport, EvalJobError> {
+pub fn compare_grids(config: &GridEvalConfig, progress: &dyn Progress) -> Result<GridEvalReport, JobError> {
     config.validate()?;
     let config = &config.with_surfaces_of_runs();
-    threads::install(config.threads, || compare(config, progress))?
+    Ok(threads::install(config.threads, || compare(config, progress))??)
 }
 
 fn compare(config: &GridEvalConfig, progress: &dyn Progress) -> Result<GridEvalReport, EvalJobError> {

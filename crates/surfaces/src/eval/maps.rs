@@ -10,6 +10,7 @@ use serde_json::Value;
 
 use super::error::EvalJobError;
 use super::requirements::EvalRequirements;
+use job::error::JobError;
 use job::files::FileError;
 use job::threads;
 
@@ -87,16 +88,16 @@ impl MapEvalConfig {
     /// Checks the settings that can be judged without opening a file.
     ///
     /// # Errors
-    /// [`EvalJobError::Job`] for a number outside of its range.
-    pub fn validate(&self) -> Result<(), EvalJobError> {
-        EvalRequirements { max_mae: self.max_mae, ..EvalRequirements::default() }.validate()
+    /// [`JobError`] for a number outside of its range.
+    pub fn validate(&self) -> Result<(), JobError> {
+        Ok(EvalRequirements { max_mae: self.max_mae, ..EvalRequirements::default() }.validate()?)
     }
 }
 
 /// Compares two maps. No file is written.
 ///
 /// # Errors
-/// [`EvalJobError`]: maps that cannot be read, have other shapes, or are of an unknown kind.
+/// [`JobError`]: maps that cannot be read, have other shapes, or are of an unknown kind.
 ///
 /// ```
 /// use surfaces::eval::{MapEvalConfig, compare_maps};
@@ -110,12 +111,12 @@ impl MapEvalConfig {
 /// assert_eq!(report.result["errors"]["mae"], 0.25);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn compare_maps(config: &MapEvalConfig, progress: &dyn Progress) -> Result<MapEvalReport, EvalJobError> {
+pub fn compare_maps(config: &MapEvalConfig, progress: &dyn Progress) -> Result<MapEvalReport, JobError> {
     config.validate()?;
-    threads::install(config.threads, || {
+    Ok(threads::install(config.threads, || {
         progress.check_cancelled()?;
         compare(config)
-    })?
+    })??)
 }
 
 fn compare(config: &MapEvalConfig) -> Result<MapEvalReport, EvalJobError> {

@@ -30,7 +30,7 @@ use std::path::Path;
 
 pub use report_folder::remove_evaluation;
 
-pub use error::EvalJobError;
+pub(crate) use error::EvalJobError;
 pub use grid_config::{EvalTarget, GridEvalConfig};
 pub use grids::{GridEvalReport, compare_grids};
 pub use maps::{MapEvalConfig, MapEvalReport, MapKind, compare_maps};

@@ -7,8 +7,8 @@ use crs::VerticalDatum;
 use eval::SurfaceComparisonConfig;
 use serde::{Deserialize, Serialize};
 
-use super::error::EvalJobError;
 use super::requirements::EvalRequirements;
+use job::error::JobError;
 
 /// A comparison of two surfaces, each a mesh, a city model or a point cloud. Nothing is aligned.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -83,9 +83,9 @@ impl SurfaceEvalConfig {
     /// Checks the settings that can be judged without opening a file.
     ///
     /// # Errors
-    /// [`EvalJobError::Job`] for a number outside of its range.
-    pub fn validate(&self) -> Result<(), EvalJobError> {
-        self.requirements.validate()
+    /// [`JobError`] for a number outside of its range.
+    pub fn validate(&self) -> Result<(), JobError> {
+        Ok(self.requirements.validate()?)
     }
 
     /// Returns the settings of the comparison itself.

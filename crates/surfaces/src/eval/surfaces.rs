@@ -12,6 +12,7 @@ use super::report_folder::{REPORT_JSON, check_ours};
 use super::requirements::EvalRequirements;
 use super::surface_config::SurfaceEvalConfig;
 use super::surface_inputs::SurfaceInputs;
+use job::error::JobError;
 use job::output_folder::OutputFolder;
 use job::{files, threads};
 
@@ -65,7 +66,7 @@ pub struct SurfaceProtocol {
 /// Compares two surfaces and writes the report if the configuration names a folder.
 ///
 /// # Errors
-/// [`EvalJobError`]: files that cannot be read or compared, coordinates that are not in metres, a
+/// [`JobError`]: files that cannot be read or compared, coordinates that are not in metres, a
 /// report that exists.
 ///
 /// ```
@@ -77,14 +78,11 @@ pub struct SurfaceProtocol {
 /// config.samples_per_m2 = 0.1;
 /// let report = evaluate_surfaces(&config, &Silent)?;
 /// assert!(report.result.chamfer_m < 1e-6);
-/// # Ok::<(), surfaces::eval::EvalJobError>(())
+/// # Ok::<(), job::error::JobError>(())
 /// ```
-pub fn evaluate_surfaces(
-    config: &SurfaceEvalConfig,
-    progress: &dyn Progress,
-) -> Result<SurfaceEvalReport, EvalJobError> {
+pub fn evaluate_surfaces(config: &SurfaceEvalConfig, progress: &dyn Progress) -> Result<SurfaceEvalReport, JobError> {
     config.validate()?;
-    threads::install(config.threads, || evaluate(config, None, progress))?
+    Ok(threads::install(config.threads, || evaluate(config, None, progress))??)
 }
 
 /// Compares a surface in memory with the reference of a configuration, as [`evaluate_surfaces`]
@@ -96,9 +94,9 @@ pub fn evaluate_surface(
     test: SurfaceFile,
     config: &SurfaceEvalConfig,
     progress: &dyn Progress,
-) -> Result<SurfaceEvalReport, EvalJobError> {
+) -> Result<SurfaceEvalReport, JobError> {
     config.validate()?;
-    threads::install(config.threads, || evaluate(config, Some(test), progress))?
+    Ok(threads::install(config.threads, || evaluate(config, Some(test), progress))??)
 }
 
 fn evaluate(

@@ -8,6 +8,7 @@ use raster::Grid;
 use serde::{Deserialize, Serialize};
 
 use super::error::GroundViewError;
+use job::error::JobError;
 use job::files::{self, FileError};
 
 /// A ground layer that is laid over a satellite layer. Splat renderers leave the colours of the
@@ -47,9 +48,9 @@ impl ComposeConfig {
     /// Checks that the output may be written.
     ///
     /// # Errors
-    /// [`GroundViewError::Job`] if the output cannot be written, or exists and may not be
+    /// [`JobError`] if the output cannot be written, or exists and may not be
     /// replaced.
-    pub fn validate(&self) -> Result<(), GroundViewError> {
+    pub fn validate(&self) -> Result<(), JobError> {
         Ok(files::check_destination(&self.output, self.overwrite)?)
     }
 }
@@ -57,7 +58,7 @@ impl ComposeConfig {
 /// Lays a ground layer over a satellite layer and writes the picture.
 ///
 /// # Errors
-/// [`GroundViewError`]: layers that cannot be read or differ in size, an output that exists.
+/// [`JobError`]: layers that cannot be read or differ in size, an output that exists.
 ///
 /// ```
 /// use surfaces::groundview::{ComposeConfig, compose};
@@ -73,7 +74,11 @@ impl ComposeConfig {
 /// assert_eq!(compose(&config, &Silent)?.size, [2, 2]);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn compose(config: &ComposeConfig, progress: &dyn Progress) -> Result<ComposeReport, GroundViewError> {
+pub fn compose(config: &ComposeConfig, progress: &dyn Progress) -> Result<ComposeReport, JobError> {
+    Ok(steps(config, progress)?)
+}
+
+fn steps(config: &ComposeConfig, progress: &dyn Progress) -> Result<ComposeReport, GroundViewError> {
     config.validate()?;
     let (ground, satellite) = (layer(&config.ground)?, layer(&config.satellite)?);
     progress.check_cancelled()?;

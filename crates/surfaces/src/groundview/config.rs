@@ -5,9 +5,8 @@ use std::path::PathBuf;
 use crs::VerticalDatum;
 use serde::{Deserialize, Serialize};
 
-use super::error::GroundViewError;
 use crate::camera_stand::StandConfig;
-use job::error::SettingError;
+use job::error::{JobError, SettingError};
 
 /// Most columns of a panorama, and most pixels along a side of a crop.
 const SIDE_MAX: usize = 16_384;
@@ -81,8 +80,8 @@ impl GroundViewConfig {
     /// Checks the settings that can be judged without opening a file.
     ///
     /// # Errors
-    /// [`GroundViewError::Job`] for a number outside of its range, [`GroundViewError::Stand`].
-    pub fn validate(&self) -> Result<(), GroundViewError> {
+    /// [`JobError`] for a number outside of its range.
+    pub fn validate(&self) -> Result<(), JobError> {
         let value = |name, found: String, expected| Err(SettingError::new(name, found, expected).into());
         if !(2..=SIDE_MAX).contains(&self.panorama_width_px) {
             return value("the width of a panorama", self.panorama_width_px.to_string(), "2 to 16384 pixels");

@@ -7,7 +7,7 @@ use numeric::{Cancelled, Kind, failures};
 
 use crate::camera_stand::StandError;
 use crate::city_files::CitySurfaceError;
-use job::error::{JobError, SettingError, from_steps};
+use job::error::{JobError, SettingError, from_steps, job_errors};
 use job::files::FileError;
 use job::map_surface::MapSurfaceError;
 use job::placed_model::PlacedModelError;
@@ -15,8 +15,7 @@ use job::threads::ThreadsError;
 
 /// Ground views that cannot be made.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum GroundViewError {
+pub(crate) enum GroundViewError {
     /// A camera cannot be used.
     #[error(transparent)]
     Stand(#[from] StandError),
@@ -118,6 +117,12 @@ failures!(GroundViewError: Other {
     Self::PlacedModel(error) => error.kind(),
     Self::Raster(error) => error.kind(),
     Self::Job(error) => error.kind(),
+});
+
+job_errors!(GroundViewError {
+    Self::NoGround => Some("the ground under the camera"),
+    Self::City(CitySurfaceError::NoSurface { .. }) => Some("the city model"),
+    Self::PlacedModel(_) => Some("the cameras"),
 });
 
 from_steps!(GroundViewError: Job(SettingError, FileError, ThreadsError, Cancelled));

@@ -30,6 +30,5 @@ mod view_surface;
 
 pub use compose::{ComposeConfig, ComposeReport, compose};
 pub use config::{GroundCameras, GroundViewConfig};
-pub use error::GroundViewError;
 pub use report::{GroundViewFailure, GroundViewReport, GroundViewRow};
 pub use run::run;

@@ -8,13 +8,14 @@ use super::output;
 use super::report::{GroundViewReport, REPORT};
 use super::shots::Shots;
 use super::view_surface::ViewSurface;
+use job::error::JobError;
 use job::output_folder::OutputFolder;
 use job::threads;
 
 /// Renders what cameras on the ground see, and writes it to a folder.
 ///
 /// # Errors
-/// [`GroundViewError`]: a surface or cameras that cannot be read, a folder that holds views
+/// [`JobError`]: a surface or cameras that cannot be read, a folder that holds views
 /// already. For a list, a row without a view is named in the report.
 ///
 /// ```
@@ -32,7 +33,11 @@ use job::threads;
 /// assert_eq!(report.views.len(), 1);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn run(config: &GroundViewConfig, progress: &dyn Progress) -> Result<GroundViewReport, GroundViewError> {
+pub fn run(config: &GroundViewConfig, progress: &dyn Progress) -> Result<GroundViewReport, JobError> {
+    Ok(steps(config, progress)?)
+}
+
+fn steps(config: &GroundViewConfig, progress: &dyn Progress) -> Result<GroundViewReport, GroundViewError> {
     config.validate()?;
     if !config.overwrite && config.output.join(REPORT).symlink_metadata().is_ok() {
         return Err(GroundViewError::FolderInUse { path: config.output.clone() });

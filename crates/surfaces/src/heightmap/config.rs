@@ -8,8 +8,8 @@ use crs::VerticalDatum;
 use heightmap::Reading;
 use serde::{Deserialize, Serialize};
 
-use super::error::HeightMapJobError;
 use crate::camera_stand::StandConfig;
+use job::error::JobError;
 
 /// Unit of the heights of a map.
 ///
@@ -161,8 +161,8 @@ impl HeightMapConfig {
     /// judged with the first tile.
     ///
     /// # Errors
-    /// [`HeightMapJobError::Stand`] for a camera whose numbers are not finite.
-    pub fn validate(&self) -> Result<(), HeightMapJobError> {
-        Ok(self.stand.validate()?)
+    /// [`JobError`] for a camera whose numbers are not finite.
+    pub fn validate(&self) -> Result<(), JobError> {
+        self.stand.validate()
     }
 }

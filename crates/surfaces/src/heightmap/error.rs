@@ -3,18 +3,18 @@
 use std::path::PathBuf;
 
 use crs::CrsError;
+use heightmap::HeightMapError;
 use numeric::{Cancelled, Kind, failures};
 
 use crate::camera_stand::StandError;
 use crate::city_files::CitySurfaceError;
-use job::error::{FileCrsError, JobError, from_steps};
+use job::error::{FileCrsError, JobError, from_steps, job_errors};
 use job::files::FileError;
 use job::threads::ThreadsError;
 
 /// A height map that cannot be made or unprojected.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum HeightMapJobError {
+pub(crate) enum HeightMapJobError {
     /// A camera cannot be used.
     #[error(transparent)]
     Stand(#[from] StandError),
@@ -59,7 +59,7 @@ pub enum HeightMapJobError {
     Position(#[from] geodesy::GeodesyError),
     /// The tile cannot be made.
     #[error(transparent)]
-    Tile(#[from] heightmap::HeightMapError),
+    Tile(#[from] HeightMapError),
     /// The tile lies beside the source.
     #[error(
         "the map around {lat_deg:.5}° N, {lon_deg:.5}° E lies outside the source: it covers x {:.1} to {:.1}, y {:.1} to \
@@ -166,6 +166,16 @@ failures!(HeightMapJobError: Other {
     Self::Crs(error) => error.kind(),
     Self::Tile(error) => error.kind(),
     Self::Job(error) => error.kind(),
+});
+
+job_errors!(HeightMapJobError {
+    Self::NoCrs { .. } => Some("the coordinate system of the source"),
+    Self::City(CitySurfaceError::NoSurface { .. }) => Some("the city model"),
+    Self::Tile(HeightMapError::Bent { .. }) => Some("the bend of the map"),
+    Self::Tile(HeightMapError::NotMetric { .. }) => Some("the coordinate system of the map"),
+    Self::Tile(HeightMapError::NoDatum { .. }) => Some("the vertical datum of the source"),
+    Self::Tile(HeightMapError::NoGround { .. }) => Some("the ground"),
+    Self::MirroredAxes => Some("the axes of the splats"),
 });
 
 from_steps!(HeightMapJobError: Job(FileError, ThreadsError, Cancelled));

@@ -21,7 +21,7 @@ mod unproject_config;
 mod vector_source;
 
 pub use config::{ConfidenceSource, HeightMapConfig, MapChoice, Normalization};
-pub use error::HeightMapJobError;
+pub(crate) use error::HeightMapJobError;
 pub use report::{HeightMapFate, HeightMapList, HeightMapMade, HeightMapRecord, HeightMapReport};
 pub use run::run;
 pub use tags::HeightMapTags;

@@ -12,13 +12,14 @@ use super::list;
 use super::maker::Maker;
 use super::report::{HeightMapMade, HeightMapReport};
 use crate::camera_stand::{CameraStand, Cameras};
+use job::error::JobError;
 use job::run_folder::surface_file;
 use job::{files, report_page, threads};
 
 /// Makes one height map, or one for each row of a list.
 ///
 /// # Errors
-/// [`HeightMapJobError`]: a source or list that cannot be read, a single map that cannot be made,
+/// [`JobError`]: a source or list that cannot be read, a single map that cannot be made,
 /// files in the way. For a list, a map that cannot be made is a failed row of the report.
 ///
 /// ```
@@ -36,7 +37,11 @@ use job::{files, report_page, threads};
 /// assert!(map.is_file());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn run(config: &HeightMapConfig, progress: &dyn Progress) -> Result<HeightMapReport, HeightMapJobError> {
+pub fn run(config: &HeightMapConfig, progress: &dyn Progress) -> Result<HeightMapReport, JobError> {
+    Ok(steps(config, progress)?)
+}
+
+fn steps(config: &HeightMapConfig, progress: &dyn Progress) -> Result<HeightMapReport, HeightMapJobError> {
     config.validate()?;
     let config = &HeightMapConfig { source: surface_file(&config.source), ..config.clone() };
     threads::install(config.threads, || match config.stand.cameras()? {

@@ -16,6 +16,7 @@ use splats::{DivisionConfig, SplatSurface, picture_splats, stretched};
 use super::error::HeightMapJobError;
 use super::tags::HeightMapTags;
 use super::unproject_config::{PointAxes, UnprojectConfig, UnprojectReport};
+use job::error::JobError;
 use job::files::FileError;
 
 /// Most pixels of a map that are read.
@@ -27,7 +28,7 @@ const GREY: [u8; 3] = [128; 3];
 /// Turns a height map back into points or Gaussian splats.
 ///
 /// # Errors
-/// [`HeightMapJobError`]: a file that is not a height map, an unknown ending of the output, an
+/// [`JobError`]: a file that is not a height map, an unknown ending of the output, an
 /// output that exists.
 ///
 /// ```
@@ -46,7 +47,11 @@ const GREY: [u8; 3] = [128; 3];
 /// assert_eq!(report.points, Some(32 * 32));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn unproject(config: &UnprojectConfig, progress: &dyn Progress) -> Result<UnprojectReport, HeightMapJobError> {
+pub fn unproject(config: &UnprojectConfig, progress: &dyn Progress) -> Result<UnprojectReport, JobError> {
+    Ok(steps(config, progress)?)
+}
+
+fn steps(config: &UnprojectConfig, progress: &dyn Progress) -> Result<UnprojectReport, HeightMapJobError> {
     config.validate()?;
     progress.begin("unproject", 1);
     let map = HeightMapFile::read(&config.map)?;

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::error::HeightMapJobError;
 use super::tags::HeightMapTags;
+use job::error::JobError;
 
 /// Axes of the points of a PLY file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -76,16 +77,16 @@ impl UnprojectConfig {
     /// Checks that the output can hold what is asked for.
     ///
     /// # Errors
-    /// [`HeightMapJobError::UnknownEnding`] or [`HeightMapJobError::MirroredAxes`].
-    pub fn validate(&self) -> Result<(), HeightMapJobError> {
+    /// [`JobError`] for an unknown ending of the output, and for splats on mirrored axes.
+    pub fn validate(&self) -> Result<(), JobError> {
         let unknown = |expected| Err(HeightMapJobError::UnknownEnding { path: self.output.clone(), expected });
-        match self.ending().as_str() {
+        Ok(match self.ending().as_str() {
             "ply" if self.splats && self.axes == PointAxes::Camera => Err(HeightMapJobError::MirroredAxes),
             "ply" => Ok(()),
             _ if self.splats => unknown(".ply for splats"),
             "las" | "laz" => Ok(()),
             _ => unknown(".ply, .las or .laz"),
-        }
+        }?)
     }
 
     /// Returns the ending of the output in lower case.

@@ -6,10 +6,9 @@ use crs::VerticalDatum;
 use ortho::MosaicRule;
 use serde::{Deserialize, Serialize};
 
-use super::error::OrthoError;
 use super::laying::{Laying, TOLERANCE_M};
 use job::corrections::CorrectionSource;
-use job::error::SettingError;
+use job::error::{JobError, SettingError};
 use job::run_folder::surface_file;
 
 /// Most images of an ortho: the mask holds their numbers as bytes.
@@ -73,8 +72,8 @@ impl OrthoConfig {
     /// Checks the settings that can be judged without opening a file.
     ///
     /// # Errors
-    /// [`OrthoError::Job`] for a number outside of its range.
-    pub fn validate(&self) -> Result<(), OrthoError> {
+    /// [`JobError`] for a number outside of its range.
+    pub fn validate(&self) -> Result<(), JobError> {
         if self.images.is_empty() || self.images.len() > IMAGES_MAX {
             return Err(SettingError::new("the number of images", self.images.len(), "1 to 255").into());
         }

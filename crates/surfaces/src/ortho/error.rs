@@ -8,14 +8,13 @@ use io::rpc::RpcReadError;
 use numeric::{Cancelled, failures};
 
 use job::corrections::CorrectionsError;
-use job::error::{ImageInputError, JobError, SettingError, from_steps};
+use job::error::{ImageInputError, JobError, SettingError, from_steps, job_errors};
 use job::files::FileError;
 use job::threads::ThreadsError;
 
 /// An ortho that cannot be made.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum OrthoError {
+pub(crate) enum OrthoError {
     /// A satellite image cannot be read with its camera.
     #[error(transparent)]
     Image(#[from] ImageInputError),
@@ -97,6 +96,11 @@ failures!(OrthoError: Other {
     Self::Image(error) => error.kind(),
     Self::Crs(error) => error.kind(),
     Self::Job(error) => error.kind(),
+});
+
+job_errors!(OrthoError {
+    Self::Balance(_) => Some("the balance of grey values"),
+    Self::TooLarge { .. } => Some("the area"),
 });
 
 from_steps!(OrthoError: Job(SettingError, FileError, ThreadsError, Cancelled), Image(RasterError, RpcReadError, CorrectionsError));

@@ -19,7 +19,7 @@ mod states;
 mod view;
 
 pub use config::OrthoConfig;
-pub use error::OrthoError;
+pub(crate) use error::OrthoError;
 pub use output::{OrthoPart, OrthoReport};
 pub use run::run;
 pub use states::OrthoCounts;

@@ -12,12 +12,13 @@ use super::mosaic::Ortho;
 use super::output::OrthoReport;
 use super::{mosaic, output};
 use job::corrections::Corrections;
+use job::error::JobError;
 use job::{files, report_page, threads};
 
 /// Makes an ortho and writes it with its mask.
 ///
 /// # Errors
-/// [`OrthoError`]: files that cannot be read, images that do not see the surface, outputs that
+/// [`JobError`]: files that cannot be read, images that do not see the surface, outputs that
 /// exist.
 ///
 /// ```
@@ -34,7 +35,11 @@ use job::{files, report_page, threads};
 /// assert!(report.cells_seen > report.cells_hidden);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn run(config: &OrthoConfig, progress: &dyn Progress) -> Result<OrthoReport, OrthoError> {
+pub fn run(config: &OrthoConfig, progress: &dyn Progress) -> Result<OrthoReport, JobError> {
+    Ok(steps(config, progress)?)
+}
+
+fn steps(config: &OrthoConfig, progress: &dyn Progress) -> Result<OrthoReport, OrthoError> {
     let corrections = Corrections::for_surface(&config.surface, &config.corrections)?;
     run_on(config, None, &corrections, progress)
 }

@@ -5,9 +5,8 @@ use std::path::PathBuf;
 use crs::VerticalDatum;
 use serde::{Deserialize, Serialize};
 
-use super::error::RegisterError;
 use job::corrections::CorrectionSource;
-use job::error::SettingError;
+use job::error::{JobError, SettingError};
 
 /// Farthest search, pixels. Providers state errors of up to tens of pixels.
 const REACH_MAX_PX: f64 = 200.0;
@@ -86,8 +85,8 @@ impl RegisterConfig {
     /// Checks the numbers.
     ///
     /// # Errors
-    /// [`RegisterError::Job`] for a reach outside of its range.
-    pub fn validate(&self) -> Result<(), RegisterError> {
+    /// [`JobError`] for a reach outside of its range.
+    pub fn validate(&self) -> Result<(), JobError> {
         if (1.0..=REACH_MAX_PX).contains(&self.reach_px) {
             return Ok(());
         }

@@ -11,15 +11,14 @@ use numeric::{Cancelled, failures};
 
 use crate::ortho::OrthoError;
 use job::corrections::CorrectionsError;
-use job::error::{ImageInputError, JobError, SettingError, from_steps};
+use job::error::{ImageInputError, JobError, SettingError, from_steps, job_errors};
 use job::files::FileError;
 use job::map_surface::MapSurfaceError;
 use job::threads::ThreadsError;
 
 /// An image that cannot be registered.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum RegisterError {
+pub(crate) enum RegisterError {
     /// The surface model cannot be used.
     #[error(transparent)]
     Surface(#[from] MapSurfaceError),
@@ -104,6 +103,12 @@ failures!(RegisterError: Other {
     Self::Image(error) => error.kind(),
     Self::Crs(error) => error.kind(),
     Self::Job(error) => error.kind(),
+});
+
+job_errors!(RegisterError {
+    Self::NoImages { .. } => Some("the images"),
+    Self::TooFew { .. } => Some("the reach of the search"),
+    Self::Laid(error) => error.setting(),
 });
 
 from_steps!(

@@ -24,6 +24,5 @@ mod run;
 mod spots;
 
 pub use config::{RegisterConfig, RegisterModel, RegisterOrder};
-pub use error::RegisterError;
 pub use report::{RegisterReport, RegisteredImage};
 pub use run::run;

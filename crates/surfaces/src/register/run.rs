@@ -14,6 +14,7 @@ use super::matching;
 use super::model::{Looks, Model, NewImage};
 use super::page;
 use super::report::{RegisterReport, RegisteredImage};
+use job::error::JobError;
 use job::{report_page, threads};
 
 /// Most rounds of matching. The first is within a pixel, the second within a tenth.
@@ -28,7 +29,7 @@ const POINTS_MIN: usize = 8;
 /// Registers an image and writes the report with its correction.
 ///
 /// # Errors
-/// [`RegisterError`]: inputs that cannot be read, a model that the image does not show, matches
+/// [`JobError`]: inputs that cannot be read, a model that the image does not show, matches
 /// that do not agree, an output that exists.
 ///
 /// ```
@@ -42,7 +43,11 @@ const POINTS_MIN: usize = 8;
 /// assert!(report.agree > 20 && report.rms_px < 0.5);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn run(config: &RegisterConfig, progress: &dyn Progress) -> Result<RegisterReport, RegisterError> {
+pub fn run(config: &RegisterConfig, progress: &dyn Progress) -> Result<RegisterReport, JobError> {
+    Ok(steps(config, progress)?)
+}
+
+fn steps(config: &RegisterConfig, progress: &dyn Progress) -> Result<RegisterReport, RegisterError> {
     config.validate()?;
     report_page::refuse_existing(&config.output, config.overwrite)?;
     let report = threads::install(config.threads, || register(config, progress))??;

@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use ortho::MosaicRule;
 use serde::{Deserialize, Serialize};
 
-use super::error::TilesError;
 use crate::heightmap::HeightMapConfig;
 use job::corrections::CorrectionSource;
+use job::error::JobError;
 
 /// Tiles around cameras.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -34,8 +34,8 @@ impl TilesConfig {
     /// Checks the settings that can be judged without opening a file.
     ///
     /// # Errors
-    /// [`TilesError::Map`] for a camera whose numbers are not finite.
-    pub fn validate(&self) -> Result<(), TilesError> {
-        Ok(self.maps.validate()?)
+    /// [`JobError`] for a camera whose numbers are not finite.
+    pub fn validate(&self) -> Result<(), JobError> {
+        self.maps.validate()
     }
 }

@@ -11,14 +11,13 @@ use crate::camera_stand::StandError;
 use crate::heightmap::HeightMapJobError;
 use crate::ortho::OrthoError;
 use job::corrections::CorrectionsError;
-use job::error::{ImageInputError, JobError, from_steps};
+use job::error::{ImageInputError, JobError, from_steps, job_errors};
 use job::files::FileError;
 use job::threads::ThreadsError;
 
 /// Tiles that cannot be made.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum TilesError {
+pub(crate) enum TilesError {
     /// A satellite image cannot be read with its camera.
     #[error(transparent)]
     Image(#[from] ImageInputError),
@@ -60,6 +59,12 @@ failures!(TilesError: Other {
     Self::Map(error) => error.kind(),
     Self::Ortho(error) => error.kind(),
     Self::Job(error) => error.kind(),
+});
+
+job_errors!(TilesError {
+    Self::Map(error) => error.setting(),
+    Self::Ortho(error) => error.setting(),
+    Self::NoImages { .. } => Some("the images"),
 });
 
 from_steps!(TilesError: Job(FileError, ThreadsError, Cancelled), Image(RasterError, RpcReadError, CorrectionsError), Map(StandError, PositionsError));

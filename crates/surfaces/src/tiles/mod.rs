@@ -15,6 +15,5 @@ mod run;
 mod satellite;
 
 pub use config::TilesConfig;
-pub use error::TilesError;
 pub use manifest::{GroundCameraInTile, SatelliteInTile, TileFate, TileManifest, TileRecord, TilesReport};
 pub use run::run;

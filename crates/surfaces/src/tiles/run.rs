@@ -19,6 +19,7 @@ use crate::camera_stand::{CameraStand, Cameras};
 use crate::heightmap::{HeightMapConfig, TileMaker};
 use crate::ortho::{self, OrthoConfig};
 use job::corrections::Corrections;
+use job::error::JobError;
 use job::error_text::with_causes;
 use job::files;
 use job::output_folder::OutputFolder;
@@ -41,9 +42,13 @@ const ROUNDS: usize = 4;
 /// Makes tiles.
 ///
 /// # Errors
-/// [`TilesError`]: a source, list or image that cannot be read, folders in the way, a single tile
+/// [`JobError`]: a source, list or image that cannot be read, folders in the way, a single tile
 /// that cannot be made. A tile of a list that cannot be made is a failed position of the report.
-pub fn run(config: &TilesConfig, progress: &dyn Progress) -> Result<TilesReport, TilesError> {
+pub fn run(config: &TilesConfig, progress: &dyn Progress) -> Result<TilesReport, JobError> {
+    Ok(steps(config, progress)?)
+}
+
+fn steps(config: &TilesConfig, progress: &dyn Progress) -> Result<TilesReport, TilesError> {
     config.validate()?;
     threads::install(config.maps.threads, || {
         let begun = Instant::now();
