@@ -7,9 +7,8 @@ use anyhow::ensure;
 use colmap::align::{AlignConfig, NoiseConfig};
 use crs::{CrsRequest, VerticalDatum};
 use io::colmap::ColmapEncoding;
-use jobs::align::{AlignJobConfig, AlignJobError, AlignJobReport, ManualAlignConfig};
-use jobs::align_page::{AlignPage, AlignPageConfig, AlignPageError};
-use jobs::view::ViewError;
+use jobs::align::{AlignJobConfig, AlignJobReport, ManualAlignConfig};
+use jobs::align_page::{AlignPage, AlignPageConfig};
 use numeric::Choice;
 
 use crate::corrections::code_of;
@@ -131,10 +130,10 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
     let config = config(args, positions)?;
     let report =
         args.write.show.watch(global, &args.output, |watcher| jobs::align::run(&config, watcher)).map_err(|error| {
-            let hint = match &error {
-                AlignJobError::Threshold { .. } => Some("give --threshold a number of metres above 0"),
-                AlignJobError::UnknownMap => Some("give the map of the positions with --crs"),
-                AlignJobError::NotMetres { .. } => Some("choose another --crs"),
+            let hint = match error.setting() {
+                Some("the threshold of the residuals") => Some("give --threshold a number of metres above 0"),
+                Some("the map of the positions") => Some("give the map of the positions with --crs"),
+                Some("the reference system") => Some("choose another --crs"),
                 _ => None,
             };
             with_hint(error, hint)
@@ -170,10 +169,7 @@ fn by_hand(args: &Args, global: Global) -> anyhow::Result<Outcome> {
         page.serve(watcher)
     });
     let report = report.map_err(|error| {
-        let hint = match &error {
-            AlignPageError::View(ViewError::Port { .. }) => Some("leave --port out for a free one"),
-            _ => None,
-        };
+        let hint = (error.setting() == Some("the port")).then_some("leave --port out for a free one");
         with_hint(error, hint)
     })?;
     show.print(global, &report, || match &report.saved {

@@ -7,7 +7,8 @@
 use std::path::PathBuf;
 
 use city::Lod;
-use jobs::city::{CityConvertConfig, CityInfoConfig, CityInput, CityJobError, CityOutputFormat, CitySummary};
+use jobs::city::{CityConvertConfig, CityInfoConfig, CityInput, CityOutputFormat, CitySummary};
+use jobs::error::JobError;
 
 use crate::error::with_hint;
 use crate::options::named;
@@ -104,10 +105,10 @@ impl Input {
     }
 }
 
-fn hinted(error: CityJobError) -> anyhow::Error {
-    let hint = match &error {
-        CityJobError::UnknownEnding { .. } => Some("give --format obj, ply, glb, geojson or cityjson"),
-        CityJobError::NothingSelected { .. } => {
+fn hinted(error: JobError) -> anyhow::Error {
+    let hint = match error.setting() {
+        Some("the format") => Some("give --format obj, ply, glb, geojson or cityjson"),
+        Some("the level of detail") => {
             Some("--lod chooses a level of detail, such as --lod 3, and --all-objects takes more than buildings")
         }
         _ => None,

@@ -7,9 +7,8 @@ use std::path::PathBuf;
 use ::priors::{Amount, DepthKind, NormalFrame, Spacing, VisibilityConfig};
 use city::Lod;
 use crs::{CrsRequest, VerticalDatum};
-use jobs::priors::{
-    LensFault, PriorsClassWeight, PriorsConfig, PriorsImages, PriorsJobError, PriorsMiss, PriorsMode, PriorsTrainer,
-};
+use jobs::error::JobError;
+use jobs::priors::{PriorsClassWeight, PriorsConfig, PriorsImages, PriorsMiss, PriorsMode, PriorsTrainer};
 use numeric::{Failure, Kind};
 
 use crate::corrections::code_of;
@@ -168,25 +167,20 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
 }
 
 /// Names the options that mend an error.
-fn hinted(error: PriorsJobError) -> anyhow::Error {
-    let hint = match &error {
-        PriorsJobError::Job(error) if error.kind() == Kind::OutputExists => {
-            Some("choose another folder or pass --overwrite")
-        }
-        PriorsJobError::NothingInSight { .. } => Some("state it with --offset or --transform"),
-        PriorsJobError::NoPicture { .. } => Some("--images=DIR names the folder of the pictures"),
-        PriorsJobError::NotSatellite => Some("leave out --model-crs, --model-vertical and --corrections"),
-        PriorsJobError::NotPerspective => Some("leave out --offset, --transform and --images"),
-        PriorsJobError::MapUnknown { .. } => Some("give --model-crs EPSG:n"),
-        PriorsJobError::NoObject { .. } => Some("skysweep city info names the reasons"),
-        PriorsJobError::Offset(_) => Some("it is given by --offset"),
-        PriorsJobError::Lens { source, .. } => match source {
-            LensFault::Distorted { .. } => Some("--maps-only makes the maps for any lens"),
-            LensFault::OffMiddle { .. } => Some(
-                "--recrop crops the camera (and writes how to crop the images), --trainer gsplat keeps the principal point",
-            ),
-            _ => None,
-        },
+fn hinted(error: JobError) -> anyhow::Error {
+    let hint = match error.setting() {
+        _ if error.kind() == Kind::OutputExists => Some("choose another folder or pass --overwrite"),
+        Some("the frame of the cameras") => Some("state it with --offset or --transform"),
+        Some("the pictures") => Some("--images=DIR names the folder of the pictures"),
+        Some("the values for satellite images") => Some("leave out --model-crs, --model-vertical and --corrections"),
+        Some("the values for perspective cameras") => Some("leave out --offset, --transform and --images"),
+        Some("the map of the model") => Some("give --model-crs EPSG:n"),
+        Some("the objects of the model") => Some("skysweep city info names the reasons"),
+        Some("the offset of the frame") => Some("it is given by --offset"),
+        Some("the lens") => Some("--maps-only makes the maps for any lens"),
+        Some("the principal point") => Some(
+            "--recrop crops the camera (and writes how to crop the images), --trainer gsplat keeps the principal point",
+        ),
         _ => None,
     };
     with_hint(error, hint)

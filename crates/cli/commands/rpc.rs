@@ -11,8 +11,8 @@ use camera::ImagePoint;
 use geodesy::LonLatHeight;
 use io::rpc::RpcFormat;
 use jobs::rpc::{
-    RpcConvertConfig, RpcDirection, RpcExportConfig, RpcInfoConfig, RpcJobError, RpcLineAnswer, RpcLinesConfig,
-    RpcPointsConfig, RpcQuery,
+    RpcConvertConfig, RpcDirection, RpcExportConfig, RpcInfoConfig, RpcLineAnswer, RpcLinesConfig, RpcPointsConfig,
+    RpcQuery,
 };
 
 use crate::error::{hinted, with_hint};
@@ -159,8 +159,8 @@ fn convert(args: &ConvertArgs) -> anyhow::Result<Outcome> {
     config.format = args.format;
     config.corrections.clone_from(&args.corrections);
     let report = jobs::rpc::convert(&config, &Log).map_err(|error| {
-        let hint = match &error {
-            RpcJobError::UnknownEnding { .. } => Some("give --format text, rpb or json"),
+        let hint = match error.setting() {
+            Some("the format") => Some("give --format text, rpb or json"),
             _ => None,
         };
         with_hint(error, hint)
@@ -177,10 +177,10 @@ fn export(args: &ExportArgs, global: Global) -> anyhow::Result<Outcome> {
     config.overwrite = args.write.overwrite;
     let watched = args.write.show.watch(global, &args.output, |watcher| jobs::rpc::export(&config, watcher));
     let report = watched.map_err(|error| {
-        let hint = match &error {
-            RpcJobError::NoHeights => Some("give --height-range LO HI"),
-            RpcJobError::NoSun { .. } => Some("give --sun AZIMUTH ELEVATION"),
-            RpcJobError::NotEmpty { .. } => Some("choose another folder or pass --overwrite"),
+        let hint = match error.setting() {
+            Some("the range of heights of the images") => Some("give --height-range LO HI"),
+            Some("the sun") => Some("give --sun AZIMUTH ELEVATION"),
+            Some("the output folder") => Some("choose another folder or pass --overwrite"),
             _ => None,
         };
         with_hint(error, hint)

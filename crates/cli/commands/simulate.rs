@@ -8,7 +8,7 @@
 use std::path::{Path, PathBuf};
 
 use ::simulate::{PRESETS, SeasonsConfig, SimulationConfig};
-use jobs::simulate::{SimulateConfig, SimulateJobError};
+use jobs::simulate::SimulateConfig;
 
 use crate::error::{hinted, with_hint};
 use crate::progress::RunOptions;
@@ -122,7 +122,7 @@ fn made(scene: SimulationConfig, args: &Args, output: &Path, global: Global) -> 
     config.overwrite = args.run.overwrite;
     let show = args.run.show;
     let report = show.watch(global, output, |watcher| jobs::simulate::run(&config, watcher)).map_err(|error| {
-        let full = matches!(error, SimulateJobError::NotEmpty { .. });
+        let full = error.setting() == Some("the output folder");
         with_hint(error, full.then_some("choose another folder or pass --overwrite"))
     })?;
     show.print(global, &report, || report.text())?;

@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use crs::VerticalDatum;
-use jobs::splats::{SplatConvertConfig, SplatLabelConfig, SplatRenderConfig, SplatsConfig, SplatsJobError};
+use jobs::error::JobError;
+use jobs::splats::{SplatConvertConfig, SplatLabelConfig, SplatRenderConfig, SplatsConfig};
 use splats::DivisionConfig;
 
 use crate::corrections::corrections_of;
@@ -263,10 +264,10 @@ fn label(args: &LabelArgs, global: Global) -> anyhow::Result<Outcome> {
     Ok(Outcome::Complete)
 }
 
-fn hinted(error: SplatsJobError) -> anyhow::Error {
-    let hint = match &error {
-        SplatsJobError::NoCamera => Some("give IMAGE or --cameras FOLDER"),
-        SplatsJobError::NotPlaced { .. } => Some("give --transform FILE"),
+fn hinted(error: JobError) -> anyhow::Error {
+    let hint = match error.setting() {
+        Some("the cameras") => Some("give IMAGE or --cameras FOLDER"),
+        Some("the place of the splats") => Some("give --transform FILE"),
         _ => None,
     };
     with_hint(error, hint)

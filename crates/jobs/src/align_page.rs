@@ -13,14 +13,15 @@
 
 use std::path::PathBuf;
 
-use numeric::{Failure, Kind, Progress, failures};
-use scenes::align::{AlignJobError, AlignMap, ManualAlign, ManualAlignConfig, ManualAlignReport};
+use numeric::{Failure, Kind, Progress};
+use scenes::align::{AlignMap, ManualAlign, ManualAlignConfig, ManualAlignReport};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
-use viewer::{PageData, PageJob, ViewConfig, ViewError, ViewServer, ViewerReport};
+use viewer::{PageData, PageJob, ViewConfig, ViewServer, ViewerReport};
 
 use camera::Similarity;
 use colmap::align::PointPair;
+use job::error::JobError;
 use job::error_text::with_causes;
 
 /// Most points that the page draws while they are dragged.
@@ -43,20 +44,6 @@ impl AlignPageConfig {
     }
 }
 
-/// Why there is no page.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum AlignPageError {
-    /// The map cannot be shown, or the server cannot be started.
-    #[error(transparent)]
-    View(#[from] ViewError),
-    /// The model cannot be aligned over the map.
-    #[error(transparent)]
-    Align(#[from] AlignJobError),
-}
-
-failures!(AlignPageError: Other { Self::View(error) => error.kind(), Self::Align(error) => error.kind() });
-
 /// What became of a page.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[non_exhaustive]
@@ -77,19 +64,19 @@ impl AlignPage {
     /// Reads the model and the map, and listens on 127.0.0.1.
     ///
     /// # Errors
-    /// [`AlignPageError`]: inputs that cannot be read, a map without a place, an output that
+    /// [`JobError`]: inputs that cannot be read, a map without a place, an output that
     /// exists, a port that is taken.
-    pub fn open(config: &AlignPageConfig, progress: &dyn Progress) -> Result<Self, AlignPageError> {
+    pub fn open(config: &AlignPageConfig, progress: &dyn Progress) -> Result<Self, JobError> {
         let server = ViewServer::open(&config.view, progress)?;
-        let frame = server.map_frame()?.ok_or(AlignJobError::MapNotPlaced)?;
-        let crs = frame.epsg.map(|code| format!("EPSG:{code}")).or(frame.wkt).ok_or(AlignJobError::MapNotPlaced)?;
-        let map = AlignMap {
-            name: frame.name,
-            crs,
-            bounds: frame.bounds,
-            ground_m: frame.ground_m,
-            vertical: frame.vertical,
-        };
+        let map = server.map_frame()?.and_then(|frame| {
+            Some(AlignMap {
+                name: frame.name,
+                crs: frame.epsg.map(|code| format!("EPSG:{code}")).or(frame.wkt)?,
+                bounds: frame.bounds,
+                ground_m: frame.ground_m,
+                vertical: frame.vertical,
+            })
+        });
         let align = ManualAlign::open(&config.align, map, progress)?;
         Ok(Self { server, desk: Desk { stride: align.points().len().div_ceil(DRAWN_MAX).max(1), align } })
     }
@@ -103,7 +90,7 @@ impl AlignPage {
     ///
     /// # Errors
     /// As [`ViewServer::open_browser`].
-    pub fn open_browser(&self) -> Result<(), AlignPageError> {
+    pub fn open_browser(&self) -> Result<(), JobError> {
         Ok(self.server.open_browser()?)
     }
 
@@ -111,7 +98,7 @@ impl AlignPage {
     ///
     /// # Errors
     /// As [`ViewServer::serve`].
-    pub fn serve(&self, progress: &dyn Progress) -> Result<AlignPageReport, AlignPageError> {
+    pub fn serve(&self, progress: &dyn Progress) -> Result<AlignPageReport, JobError> {
         let page = self.server.serve_job(&self.desk, progress)?;
         Ok(AlignPageReport { saved: self.desk.align.saved(), page })
     }
@@ -194,7 +181,7 @@ impl PageJob for Desk {
 }
 
 /// Words for a save that is refused.
-fn refused(error: &AlignJobError) -> String {
+fn refused(error: &JobError) -> String {
     let text = with_causes(error);
     if error.kind() == Kind::OutputExists {
         format!("{text}. Nothing was written: start the page so that it may overwrite, or with another folder")

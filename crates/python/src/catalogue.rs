@@ -31,7 +31,7 @@ use jobs::production::{ChunkRunConfig, ChunkRunReport, MergeConfig, PlanFile};
 use jobs::products::{ProductsConfig, ProductsReport};
 use jobs::register::{RegisterConfig, RegisterModel, RegisterReport};
 use jobs::rpc::{RpcConvertConfig, RpcConvertReport, RpcInfoConfig, RpcInfoReport};
-use jobs::simulate::{SimulateConfig, SimulateJobError, SimulateReport};
+use jobs::simulate::{SimulateConfig, SimulateReport};
 use jobs::splats::{
     SplatConvertConfig, SplatConvertReport, SplatLabelConfig, SplatLabelReport, SplatRenderConfig, SplatRenderReport,
     SplatsConfig, SplatsReport,
@@ -531,7 +531,7 @@ fn named_scene(scene: &str) -> Result<SimulationConfig, Fault> {
     if is_file {
         return Ok(jobs::simulate::read_scene(Path::new(scene))?);
     }
-    Ok(SimulationConfig::preset(scene).map_err(SimulateJobError::from)?)
+    SimulationConfig::preset(scene).map_err(|error| Fault::input(&error))
 }
 
 /// Returns the job called `name`.

@@ -29,7 +29,7 @@ use raster::Grid;
 use serde::{Deserialize, Serialize};
 
 use crate::simulate_page;
-use job::error::{JobError, SettingError, from_steps};
+use job::error::{JobError, SettingError, from_steps, job_errors};
 use job::files::{self, FileError};
 use job::guarded;
 use job::output_folder::OutputFolder;
@@ -98,8 +98,7 @@ pub struct SimulateReport {
 
 /// A simulation that could not be made or written.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum SimulateJobError {
+pub(crate) enum SimulateJobError {
     /// The parameters describe no scene, or the cameras do not see it.
     #[error(transparent)]
     Scene(#[from] SimulateError),
@@ -141,6 +140,10 @@ failures!(SimulateJobError: Other {
     Self::Job(error) => error.kind(),
 });
 
+job_errors!(SimulateJobError {
+    Self::NotEmpty { .. } => Some("the output folder"),
+});
+
 from_steps!(SimulateJobError: Job(FileError, ThreadsError, SettingError, Cancelled));
 
 impl SimulateReport {
@@ -170,9 +173,8 @@ impl SimulateConfig {
     /// Checks the parameters of the scene and the flight.
     ///
     /// # Errors
-    /// [`SimulateJobError::Scene`]; [`SimulateJobError::Job`] for an arc or a spacing out
-    /// of range.
-    pub fn validate(&self) -> Result<(), SimulateJobError> {
+    /// [`JobError`] for parameters, an arc or a spacing out of range.
+    pub fn validate(&self) -> Result<(), JobError> {
         if let Some(end) = self.flight_arc_deg.iter().flatten().find(|end| !(-360.0..=360.0).contains(*end)) {
             return Err(SettingError::new("an end of the arc of the flight", *end, "-360 to 360").into());
         }
@@ -180,23 +182,24 @@ impl SimulateConfig {
             let found = self.flight_spacing_m;
             return Err(SettingError::new("the spacing of the exact surface", found, "0.01 to 100 metres").into());
         }
-        Ok(self.scene.validate()?)
+        Ok(self.scene.validate().map_err(SimulateJobError::from)?)
     }
 }
 
 /// Reads the parameters of a scene from a TOML file.
 ///
 /// # Errors
-/// [`SimulateJobError::Job`] and [`SimulateJobError::Parameters`].
-pub fn read_scene(path: &Path) -> Result<SimulationConfig, SimulateJobError> {
+/// [`JobError`]: a file that cannot be read, or holds no parameters of a scene.
+pub fn read_scene(path: &Path) -> Result<SimulationConfig, JobError> {
     let text = files::read_text(path)?;
-    SimulationConfig::from_toml(&text).map_err(|source| SimulateJobError::Parameters { path: path.to_owned(), source })
+    let refused = |source| SimulateJobError::Parameters { path: path.to_owned(), source };
+    Ok(SimulationConfig::from_toml(&text).map_err(refused)?)
 }
 
 /// Simulates a scene and writes its images and its truth.
 ///
 /// # Errors
-/// [`SimulateJobError`]: parameters out of range, a folder that is not empty, a file that cannot be
+/// [`JobError`]: parameters out of range, a folder that is not empty, a file that cannot be
 /// written.
 ///
 /// ```
@@ -209,7 +212,11 @@ pub fn read_scene(path: &Path) -> Result<SimulationConfig, SimulateJobError> {
 /// assert!(report.views == 2 && report.output.join("truth/dsm.tif").is_file());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn run(config: &SimulateConfig, progress: &dyn Progress) -> Result<SimulateReport, SimulateJobError> {
+pub fn run(config: &SimulateConfig, progress: &dyn Progress) -> Result<SimulateReport, JobError> {
+    Ok(steps(config, progress)?)
+}
+
+fn steps(config: &SimulateConfig, progress: &dyn Progress) -> Result<SimulateReport, SimulateJobError> {
     config.validate()?;
     let output = &config.output;
     let folder = OutputFolder::take(output)?;

@@ -7,7 +7,7 @@ use colmap::split::{ChosenView, SplitConfig, SplitError, points_of_views, split}
 use io::colmap::{ColmapError, ColmapModel, ColmapPoint};
 use serde::{Deserialize, Serialize};
 
-use job::error::{JobError, from_steps};
+use job::error::{JobError, from_steps, job_errors};
 use job::files::{self, FileError};
 use job::report_page;
 use numeric::{Cancelled, Progress, failures};
@@ -61,8 +61,7 @@ pub struct SplitImage {
 
 /// A split that could not be made.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum SplitJobError {
+pub(crate) enum SplitJobError {
     /// The model cannot be read.
     #[error(transparent)]
     Model(#[from] ColmapError),
@@ -92,6 +91,8 @@ failures!(SplitJobError: Other {
     Self::Model(error) => error.kind(),
     Self::Job(error) => error.kind(),
 });
+
+job_errors!(SplitJobError);
 
 from_steps!(SplitJobError: Job(FileError, Cancelled));
 
@@ -132,17 +133,22 @@ impl SplitJobConfig {
 /// Chooses context and target views.
 ///
 /// # Errors
-/// [`SplitJobError`]: a model without points, an unknown first image, overlaps that cannot be
+/// [`JobError`]: a model without points, an unknown first image, overlaps that cannot be
 /// served, an output that exists.
 ///
 /// ```
-/// use scenes::split::{SplitJobConfig, SplitJobError, run};
+/// use numeric::{Failure, Kind};
+/// use scenes::split::{SplitJobConfig, run};
 /// // The cameras of the sample have no points, so they share nothing that could be compared.
 /// let model = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data-samples/town/cameras/sparse/0");
 /// let refused = run(&SplitJobConfig::narrow(model.into()), &numeric::Silent);
-/// assert!(matches!(refused, Err(SplitJobError::Split(_) | SplitJobError::Model(_))));
+/// assert!(matches!(refused.unwrap_err().kind(), Kind::Other | Kind::File));
 /// ```
-pub fn run(config: &SplitJobConfig, progress: &dyn Progress) -> Result<SplitJobReport, SplitJobError> {
+pub fn run(config: &SplitJobConfig, progress: &dyn Progress) -> Result<SplitJobReport, JobError> {
+    Ok(steps(config, progress)?)
+}
+
+fn steps(config: &SplitJobConfig, progress: &dyn Progress) -> Result<SplitJobReport, SplitJobError> {
     if let Some(path) = &config.output {
         files::check_destination(path, config.overwrite)?;
         report_page::refuse_existing(path, config.overwrite)?;

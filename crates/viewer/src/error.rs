@@ -7,7 +7,7 @@ use io::raster::RasterError;
 use io::splat_ply::SplatPlyError;
 use numeric::{Kind, failures};
 
-use job::error::{JobError, SettingError, from_steps};
+use job::error::{JobError, SettingError, from_steps, job_errors};
 
 /// A viewer that cannot be opened.
 #[derive(Debug, thiserror::Error)]
@@ -108,5 +108,7 @@ failures!(ViewError: Other {
     Self::Splats(error) => error.kind(),
     Self::Job(error) => error.kind(),
 });
+
+job_errors!(ViewError { Self::Port { .. } => Some("the port") });
 
 from_steps!(ViewError: Job(SettingError));

@@ -21,6 +21,7 @@ use super::output::{ModelWithPoints, ModelWriter, SimilarityParts};
 use super::photograph::Photographs;
 use super::{AlignResidual, Aligned, REPORT, aligned, read_model};
 use job::dataset_folder::{dataset_folder, pictures_folder, sparse_folder};
+use job::error::JobError;
 use job::files::{self, FileError};
 use job::output_folder::OutputFolder;
 use job::report_page;
@@ -173,9 +174,18 @@ impl ManualAlign {
     /// Reads a model and lays it over a map. Refuses what could not be saved later.
     ///
     /// # Errors
-    /// [`AlignJobError`]: a model without points, a map that is not in metres, an output that
-    /// exists.
-    pub fn open(config: &ManualAlignConfig, map: AlignMap, progress: &dyn Progress) -> Result<Self, AlignJobError> {
+    /// [`JobError`]: a model without points, a map without a place in the world (`None`) or not in
+    /// metres, an output that exists.
+    pub fn open(config: &ManualAlignConfig, map: Option<AlignMap>, progress: &dyn Progress) -> Result<Self, JobError> {
+        Ok(Self::opened(config, map, progress)?)
+    }
+
+    fn opened(
+        config: &ManualAlignConfig,
+        map: Option<AlignMap>,
+        progress: &dyn Progress,
+    ) -> Result<Self, AlignJobError> {
+        let map = map.ok_or(AlignJobError::MapNotPlaced)?;
         report_page::refuse_existing(&config.output.join(REPORT), config.overwrite)?;
         OutputFolder::check(&config.output)?;
         let sparse = sparse_folder(&config.model);
@@ -259,9 +269,10 @@ impl ManualAlign {
 
     /// Returns the photograph of a view as a pinhole sees it, as PNG of at most 1024 pixels along
     /// its longer side; `None` for a view that is not there.
-    pub fn photograph(&self, view: usize) -> Option<Result<Vec<u8>, AlignJobError>> {
+    pub fn photograph(&self, view: usize) -> Option<Result<Vec<u8>, JobError>> {
         let view = self.model.cameras.views.get(view)?;
-        Some(self.photographs.png(&view.name, self.model.cameras.lenses.get(view.lens)?))
+        let lens = self.model.cameras.lenses.get(view.lens)?;
+        Some(self.photographs.png(&view.name, lens).map_err(JobError::from))
     }
 
     /// Fits a similarity to pairs of positions in the model and in the world, relative to the
@@ -294,8 +305,12 @@ impl ManualAlign {
     /// Writes the moved model with the similarity, its origin, the pairs and a report.
     ///
     /// # Errors
-    /// [`AlignJobError`]: an output that exists or cannot be written, too many pairs.
-    pub fn save(&self, similarity: &Similarity, pairs: &[PointPair]) -> Result<ManualAlignReport, AlignJobError> {
+    /// [`JobError`]: an output that exists or cannot be written, too many pairs.
+    pub fn save(&self, similarity: &Similarity, pairs: &[PointPair]) -> Result<ManualAlignReport, JobError> {
+        Ok(self.saved_as(similarity, pairs)?)
+    }
+
+    fn saved_as(&self, similarity: &Similarity, pairs: &[PointPair]) -> Result<ManualAlignReport, AlignJobError> {
         if pairs.len() > PAIRS_MAX {
             return Err(AlignJobError::TooManyPairs { found: pairs.len(), most: PAIRS_MAX });
         }

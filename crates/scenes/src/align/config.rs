@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use colmap::align::{AlignConfig, NoiseConfig};
 use crs::VerticalDatum;
 use io::colmap::ColmapEncoding;
+use job::error::JobError;
 use serde::{Deserialize, Serialize};
 
 use super::error::AlignJobError;
@@ -63,15 +64,15 @@ impl AlignJobConfig {
     /// Checks the numbers.
     ///
     /// # Errors
-    /// [`AlignJobError::Threshold`] and [`AlignJobError::NoiseLevel`].
-    pub fn validate(&self) -> Result<(), AlignJobError> {
+    /// [`JobError`] for a threshold or a level of noise outside of its range.
+    pub fn validate(&self) -> Result<(), JobError> {
         if let Some(threshold_m) = self.threshold_m.filter(|threshold_m| threshold_m.is_nan() || *threshold_m <= 0.0) {
-            return Err(AlignJobError::Threshold { threshold_m });
+            return Err(AlignJobError::Threshold { threshold_m }.into());
         }
         let noise = self.noise.iter();
         let mut levels = noise.flat_map(|noise| noise.translation_m.iter().chain(&noise.rotation_deg));
         match levels.find(|level| !(**level >= 0.0 && level.is_finite())) {
-            Some(level) => Err(AlignJobError::NoiseLevel { level: *level }),
+            Some(level) => Err(AlignJobError::NoiseLevel { level: *level }.into()),
             None => Ok(()),
         }
     }

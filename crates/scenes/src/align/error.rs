@@ -10,13 +10,12 @@ use io::control::ControlError;
 use io::raster::RasterError;
 use numeric::{Cancelled, failures};
 
-use job::error::{JobError, from_steps};
+use job::error::{JobError, from_steps, job_errors};
 use job::files::FileError;
 
 /// An alignment that could not be made.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum AlignJobError {
+pub(crate) enum AlignJobError {
     /// The threshold is not a positive number.
     #[error("the threshold of the residuals is {threshold_m}, expected a number of metres above 0")]
     Threshold {
@@ -112,6 +111,12 @@ failures!(AlignJobError: Other {
     Self::Crs(error) => error.kind(),
     Self::Picture(error) => error.kind(),
     Self::Job(error) => error.kind(),
+});
+
+job_errors!(AlignJobError {
+    Self::Threshold { .. } => Some("the threshold of the residuals"),
+    Self::UnknownMap => Some("the map of the positions"),
+    Self::NotMetres { .. } => Some("the reference system"),
 });
 
 from_steps!(AlignJobError: Job(FileError, Cancelled));

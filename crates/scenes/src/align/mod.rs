@@ -22,9 +22,10 @@ use serde::Serialize;
 
 pub use by_hand::{AlignMap, ManualAlign, ManualAlignConfig, ManualAlignReport, ManualFit, ManualStart};
 pub use config::AlignJobConfig;
-pub use error::AlignJobError;
 pub use output::SimilarityParts;
 
+use error::AlignJobError;
+use job::error::JobError;
 use job::files::create_folder;
 use job::output_folder::OutputFolder;
 use job::report_page;
@@ -92,7 +93,7 @@ pub struct AlignResidual {
 /// Aligns a COLMAP model and writes the moved model with a report.
 ///
 /// # Errors
-/// [`AlignJobError`]: an input that cannot be read, positions that determine no similarity, an
+/// [`JobError`]: an input that cannot be read, positions that determine no similarity, an
 /// output that exists.
 ///
 /// ```
@@ -112,7 +113,11 @@ pub struct AlignResidual {
 /// assert!((report.world_from_model.scale - 1.0).abs() < 1e-6);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn run(config: &AlignJobConfig, progress: &dyn Progress) -> Result<AlignJobReport, AlignJobError> {
+pub fn run(config: &AlignJobConfig, progress: &dyn Progress) -> Result<AlignJobReport, JobError> {
+    Ok(steps(config, progress)?)
+}
+
+fn steps(config: &AlignJobConfig, progress: &dyn Progress) -> Result<AlignJobReport, AlignJobError> {
     config.validate()?;
     let report_path = config.output.join(REPORT);
     report_page::refuse_existing(&report_path, config.overwrite)?;

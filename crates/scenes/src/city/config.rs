@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use city::Lod;
+use job::error::JobError;
 use serde::{Deserialize, Serialize};
 
 use super::error::CityJobError;
@@ -100,9 +101,9 @@ impl CityConvertConfig {
     /// Checks that a format is known.
     ///
     /// # Errors
-    /// [`CityJobError::UnknownEnding`] when neither `format` nor the ending of `output` names one.
-    pub fn validate(&self) -> Result<(), CityJobError> {
-        self.output_format().map(drop)
+    /// [`JobError`] when neither `format` nor the ending of `output` names one.
+    pub fn validate(&self) -> Result<(), JobError> {
+        Ok(self.output_format().map(drop)?)
     }
 
     /// The format to write.

@@ -9,6 +9,7 @@ use super::account::{CityAccount, CitySummary};
 use super::config::{CityConvertConfig, CityOutputFormat};
 use super::error::CityJobError;
 use super::input::{self, OpenedCity};
+use job::error::JobError;
 use job::files;
 use numeric::Progress;
 
@@ -29,9 +30,9 @@ pub struct CityConvertReport {
 /// (CityJSON 2.0) of a model.
 ///
 /// # Errors
-/// [`CityJobError::UnknownEnding`], [`CityJobError::NothingSelected`] when no object has a surface
-/// to write (CityJSON takes all objects and levels), [`CityJobError::Read`],
-/// [`CityJobError::Model`], and [`CityJobError::Job`] when an output exists or cannot be written.
+/// [`JobError`]: an unknown ending of the output, a model that cannot be read, no object with a
+/// surface to write (CityJSON takes all objects and levels), an output that exists or cannot be
+/// written.
 ///
 /// ```
 /// use scenes::city::{CityConvertConfig, convert};
@@ -42,7 +43,11 @@ pub struct CityConvertReport {
 /// assert!(std::fs::read_to_string(output)?.contains("\nv "));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn convert(config: &CityConvertConfig, progress: &dyn Progress) -> Result<CityConvertReport, CityJobError> {
+pub fn convert(config: &CityConvertConfig, progress: &dyn Progress) -> Result<CityConvertReport, JobError> {
+    Ok(steps(config, progress)?)
+}
+
+fn steps(config: &CityConvertConfig, progress: &dyn Progress) -> Result<CityConvertReport, CityJobError> {
     config.validate()?;
     let format = config.output_format()?;
     for path in [Some(&config.output), config.input.account.as_ref()].into_iter().flatten() {

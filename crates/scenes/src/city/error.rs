@@ -6,13 +6,12 @@ use city::ModelError;
 use cityfiles::CityError;
 use numeric::{Cancelled, failures};
 
-use job::error::{JobError, from_steps};
+use job::error::{JobError, from_steps, job_errors};
 use job::files::FileError;
 
 /// A city model job that could not be done.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum CityJobError {
+pub(crate) enum CityJobError {
     /// The model cannot be read, or the output cannot be written.
     #[error(transparent)]
     Read(CityError),
@@ -51,6 +50,11 @@ pub enum CityJobError {
 failures!(CityJobError: Other {
     Self::Read(error) => error.kind(),
     Self::Job(error) => error.kind(),
+});
+
+job_errors!(CityJobError {
+    Self::UnknownEnding { .. } => Some("the format"),
+    Self::NothingSelected { .. } => Some("the level of detail"),
 });
 
 from_steps!(CityJobError: Job(FileError, Cancelled));

@@ -15,25 +15,24 @@ mod text;
 pub use account::{CityAccount, CityCrsSummary, CityDefectCount, CityDefectEntry, CityObjectEntry, CitySummary};
 pub use config::{CityConvertConfig, CityInfoConfig, CityInput, CityOutputFormat};
 pub use convert::{CityConvertReport, convert};
-pub use error::CityJobError;
 
+use job::error::JobError;
 use numeric::Progress;
 
 /// Describes a city model and writes the account of every object where the configuration names a
 /// file for it.
 ///
 /// # Errors
-/// [`CityJobError::Read`], [`CityJobError::Model`], [`CityJobError::Job`] when the account exists
-/// or cannot be written.
+/// [`JobError`]: a model that cannot be read, an account that exists or cannot be written.
 ///
 /// ```
 /// use scenes::city::{CityInfoConfig, info};
 /// let model = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data-samples/town/truth/buildings.city.json");
 /// let summary = info(&CityInfoConfig::new(model.into()), &numeric::Silent)?;
 /// assert!(summary.triangles > 100 && !summary.incomplete);
-/// # Ok::<(), scenes::city::CityJobError>(())
+/// # Ok::<(), job::error::JobError>(())
 /// ```
-pub fn info(config: &CityInfoConfig, progress: &dyn Progress) -> Result<CitySummary, CityJobError> {
+pub fn info(config: &CityInfoConfig, progress: &dyn Progress) -> Result<CitySummary, JobError> {
     let opened = input::open(&config.input, progress)?;
     let account = CityAccount::of(&opened);
     account.write(&config.input)?;

@@ -10,14 +10,13 @@ use numeric::{Cancelled, failures};
 use tsdf::FusionError;
 
 use crate::train::TrainError;
-use job::error::{JobError, SettingError, from_steps};
+use job::error::{JobError, SettingError, from_steps, job_errors};
 use job::files::FileError;
 use job::threads::ThreadsError;
 
 /// A mesh that is not made.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum MeshJobError {
+pub(crate) enum MeshJobError {
     /// The cameras cannot be read.
     #[error(transparent)]
     Model(#[from] ColmapError),
@@ -92,6 +91,10 @@ failures!(MeshJobError: Other {
     Self::Image(error) => error.kind(),
     Self::Comparison(error) => error.kind(),
     Self::Job(error) => error.kind(),
+});
+
+job_errors!(MeshJobError {
+    Self::Place(error) => error.setting(),
 });
 
 impl From<TrainError> for MeshJobError {

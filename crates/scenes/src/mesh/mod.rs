@@ -10,5 +10,4 @@ mod error;
 mod run;
 
 pub use config::{DepthSource, MeshJobConfig};
-pub use error::MeshJobError;
 pub use run::{MeshJobReport, run};

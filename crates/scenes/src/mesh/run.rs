@@ -14,6 +14,7 @@ use super::depths;
 use super::error::MeshJobError;
 use crate::train::DatasetPlace;
 use job::dataset_folder::sparse_folder;
+use job::error::JobError;
 use job::files::{self, FileError};
 use job::report_page;
 use job::threads;
@@ -71,9 +72,13 @@ impl MeshJobReport {
 /// Fuses the depth maps of a dataset and writes the mesh.
 ///
 /// # Errors
-/// [`MeshJobError`]: a dataset that cannot be read, maps of another size, a volume that is too
+/// [`JobError`]: a dataset that cannot be read, maps of another size, a volume that is too
 /// large, an output that exists.
-pub fn run(config: &MeshJobConfig, progress: &dyn Progress) -> Result<MeshJobReport, MeshJobError> {
+pub fn run(config: &MeshJobConfig, progress: &dyn Progress) -> Result<MeshJobReport, JobError> {
+    Ok(steps(config, progress)?)
+}
+
+fn steps(config: &MeshJobConfig, progress: &dyn Progress) -> Result<MeshJobReport, MeshJobError> {
     config.validate()?;
     files::check_destination(&config.output, config.overwrite)?;
     let report_path = report_path(&config.output);

@@ -6,6 +6,7 @@ use std::str::FromStr;
 use ::priors::{Amount, ClassWeights, MapConfig, SampleConfig, Spacing, VisibilityConfig};
 use city::{Lod, SurfaceClass};
 use crs::VerticalDatum;
+use job::error::JobError;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::error::PriorsJobError;
@@ -235,13 +236,12 @@ impl PriorsConfig {
     /// Checks that the values go together.
     ///
     /// # Errors
-    /// [`PriorsJobError::TwoFrames`] for an offset beside a transform, [`PriorsJobError::Priors`]
-    /// for a bad weight.
-    pub fn validate(&self) -> Result<(), PriorsJobError> {
+    /// [`JobError`] for an offset beside a transform, and for a bad weight.
+    pub fn validate(&self) -> Result<(), JobError> {
         if self.offset.is_some() && self.transform.is_some() {
-            return Err(PriorsJobError::TwoFrames);
+            return Err(PriorsJobError::TwoFrames.into());
         }
-        self.sampling().map(drop)
+        Ok(self.sampling().map(drop)?)
     }
 
     /// How points are sampled.

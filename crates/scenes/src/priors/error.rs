@@ -17,14 +17,13 @@ use numeric::{Cancelled, Kind, failures};
 use report::PictureError;
 
 use job::corrections::CorrectionsError;
-use job::error::{ImageInputError, JobError, from_steps};
+use job::error::{ImageInputError, JobError, from_steps, job_errors};
 use job::files::FileError;
 use job::threads::ThreadsError;
 
 /// Priors that could not be made.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum PriorsJobError {
+pub(crate) enum PriorsJobError {
     /// Both an offset and a transform were given.
     #[error("an offset and a transform were given, expected one of them")]
     TwoFrames,
@@ -275,12 +274,23 @@ failures!(PriorsJobError: Other {
     Self::Job(error) => error.kind(),
 });
 
+job_errors!(PriorsJobError {
+    Self::NothingInSight { .. } => Some("the frame of the cameras"),
+    Self::NoPicture { .. } => Some("the pictures"),
+    Self::NotSatellite => Some("the values for satellite images"),
+    Self::NotPerspective => Some("the values for perspective cameras"),
+    Self::MapUnknown { .. } => Some("the map of the model"),
+    Self::NoObject { .. } => Some("the objects of the model"),
+    Self::Offset(_) => Some("the offset of the frame"),
+    Self::Lens { source: LensFault::Distorted { .. }, .. } => Some("the lens"),
+    Self::Lens { source: LensFault::OffMiddle { .. }, .. } => Some("the principal point"),
+});
+
 from_steps!(PriorsJobError: Job(FileError, ThreadsError, Cancelled), Image(RasterError, RpcReadError, CorrectionsError));
 
 /// What a trainer cannot do with a lens.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum LensFault {
+pub(crate) enum LensFault {
     /// The image is distorted.
     #[error(
         "its lens is {model}, and trainers take undistorted images only: undistort them (colmap image_undistorter) and \

@@ -31,18 +31,19 @@ mod trainer;
 pub(crate) use labels::with_table;
 
 pub use config::{PriorsClassWeight, PriorsConfig, PriorsImages, PriorsMiss, PriorsMode, PriorsTrainer};
-pub use error::{LensFault, PriorsJobError};
 pub use outcome::{PriorsJobReport, PriorsProduct};
 pub use trainer::ImageCrop;
 
 use numeric::Progress;
 
+use error::PriorsJobError;
+use job::error::JobError;
 use job::threads::install;
 
 /// Makes the priors of a city model for perspective cameras or satellite images.
 ///
 /// # Errors
-/// [`PriorsJobError`]: an input that cannot be used, no building in any image, an output that
+/// [`JobError`]: an input that cannot be used, no building in any image, an output that
 /// exists.
 ///
 /// ```
@@ -57,7 +58,11 @@ use job::threads::install;
 /// assert!(config.output.join("height/view_1.tif").is_file() && report.unusable_objects == 0);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn run(config: &PriorsConfig, progress: &dyn Progress) -> Result<PriorsJobReport, PriorsJobError> {
+pub fn run(config: &PriorsConfig, progress: &dyn Progress) -> Result<PriorsJobReport, JobError> {
+    Ok(steps(config, progress)?)
+}
+
+fn steps(config: &PriorsConfig, progress: &dyn Progress) -> Result<PriorsJobReport, PriorsJobError> {
     config.validate()?;
     install(config.threads, || match cameras::satellite_images(&config.cameras)? {
         Some(images) => satellite::make(config, &images, progress),

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::error::RpcJobError;
 use super::input;
 use job::corrections::{CorrectionSource, Corrections};
+use job::error::JobError;
 use numeric::Progress;
 
 /// A conversion of the RPC of one file.
@@ -57,17 +58,17 @@ impl RpcConvertConfig {
     /// Checks that a format is known.
     ///
     /// # Errors
-    /// [`RpcJobError::UnknownEnding`] when neither `format` nor the ending of `output` names one.
-    pub fn validate(&self) -> Result<(), RpcJobError> {
-        self.format.map_or_else(|| format_of(&self.output).map(drop), |_| Ok(()))
+    /// [`JobError`] when neither `format` nor the ending of `output` names one.
+    pub fn validate(&self) -> Result<(), JobError> {
+        Ok(self.format.map_or_else(|| format_of(&self.output).map(drop), |_| Ok(()))?)
     }
 }
 
 /// Writes the RPC of a file as text, RPB or JSON, or an image again with the RPC in its tag.
 ///
 /// # Errors
-/// [`RpcJobError::UnknownEnding`], [`RpcJobError::Read`], [`RpcJobError::NotCorrected`], and
-/// [`RpcJobError::Write`], among it an output that exists.
+/// [`JobError`]: an unknown ending of the output, no usable RPC, a report without a correction of
+/// the image, an output that exists or cannot be written.
 ///
 /// ```
 /// use scenes::rpc::{RpcConvertConfig, convert};
@@ -78,7 +79,11 @@ impl RpcConvertConfig {
 /// assert_eq!(io::rpc::read(&report.output)?.rpc, io::rpc::read(image.as_ref())?.rpc);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn convert(config: &RpcConvertConfig, progress: &dyn Progress) -> Result<RpcConvertReport, RpcJobError> {
+pub fn convert(config: &RpcConvertConfig, progress: &dyn Progress) -> Result<RpcConvertReport, JobError> {
+    Ok(steps(config, progress)?)
+}
+
+fn steps(config: &RpcConvertConfig, progress: &dyn Progress) -> Result<RpcConvertReport, RpcJobError> {
     config.validate()?;
     let format = config.format.map_or_else(|| format_of(&config.output), Ok)?;
     let file = input::read(&config.file, progress)?;

@@ -8,14 +8,13 @@ use io::rpc::{RpcReadError, RpcWriteError};
 use numeric::{Kind, failures};
 
 use job::corrections::CorrectionsError;
-use job::error::{ImageInputError, JobError, SettingError, from_steps};
+use job::error::{ImageInputError, JobError, SettingError, from_steps, job_errors};
 use job::files::FileError;
 use job::image_files::ImageFilesError;
 
 /// An RPC job that could not be done.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum RpcJobError {
+pub(crate) enum RpcJobError {
     /// The file holds no RPC that can be used.
     #[error(transparent)]
     Read(Box<RpcReadError>),
@@ -148,12 +147,18 @@ failures!(RpcJobError: Other {
     Self::Cancelled(error) => error.kind(),
 });
 
+job_errors!(RpcJobError {
+    Self::UnknownEnding { .. } => Some("the format"),
+    Self::NoHeights => Some("the range of heights of the images"),
+    Self::NoSun { .. } => Some("the sun"),
+    Self::NotEmpty { .. } => Some("the output folder"),
+});
+
 from_steps!(RpcJobError: Read(RpcReadError), Job(FileError, SettingError));
 
 /// What is wrong with a line of points.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum LineFault {
+pub(crate) enum LineFault {
     /// The line cannot be read.
     #[error("cannot read the line")]
     Unreadable(#[from] std::io::Error),

@@ -21,7 +21,7 @@ use serde_json::{Value, json};
 
 use super::error::RpcJobError;
 use super::export_scene::{Scene, scene_of};
-use job::error::{ImageInputError, SettingError};
+use job::error::{ImageInputError, JobError, SettingError};
 use job::files;
 use job::output_folder::OutputFolder;
 
@@ -99,10 +99,10 @@ impl RpcExportConfig {
     /// Checks the range of heights and the sun.
     ///
     /// # Errors
-    /// [`RpcJobError::Job`].
-    pub fn validate(&self) -> Result<(), RpcJobError> {
+    /// [`JobError`] that names the setting.
+    pub fn validate(&self) -> Result<(), JobError> {
         let setting = |name, found: [f64; 2], expected: &str| {
-            RpcJobError::from(SettingError::new(name, format!("{} {}", found[0], found[1]), expected))
+            JobError::from(SettingError::new(name, format!("{} {}", found[0], found[1]), expected))
         };
         match (self.height_range_m, self.sun_deg) {
             (Some(range @ [low, high]), _) if !(low < high && low > -1000.0 && high < 10_000.0) => {
@@ -136,7 +136,7 @@ impl RpcExportReport {
 /// Writes images and cameras in the layout of Sat-NeRF.
 ///
 /// # Errors
-/// [`RpcJobError`]: a setting out of range, images that cannot be read, without RPC or of one name,
+/// [`JobError`]: a setting out of range, images that cannot be read, without RPC or of one name,
 /// an unknown sun or range of heights, a folder that holds something else.
 ///
 /// ```
@@ -151,7 +151,11 @@ impl RpcExportReport {
 /// assert!(report.images[0].held_out && report.output.join("cameras/view_2.json").is_file());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn export(config: &RpcExportConfig, progress: &dyn Progress) -> Result<RpcExportReport, RpcJobError> {
+pub fn export(config: &RpcExportConfig, progress: &dyn Progress) -> Result<RpcExportReport, JobError> {
+    Ok(steps(config, progress)?)
+}
+
+fn steps(config: &RpcExportConfig, progress: &dyn Progress) -> Result<RpcExportReport, RpcJobError> {
     config.validate()?;
     let scene = scene_of(&config.inputs, config.height_range_m, progress)?;
     let names = names(&scene.images)?;

@@ -10,6 +10,7 @@ use std::path::PathBuf;
 use camera::{CameraError, ImagePoint, Rpc, RpcCamera};
 use geodesy::LonLatHeight;
 use io::rpc::RpcFormat;
+use job::error::JobError;
 use serde::{Deserialize, Serialize};
 
 use super::error::RpcJobError;
@@ -86,16 +87,20 @@ impl RpcInfoConfig {
 /// Describes the RPC of a file.
 ///
 /// # Errors
-/// [`RpcJobError::Read`] when the file holds no usable RPC.
+/// [`JobError`] when the file holds no usable RPC.
 ///
 /// ```
 /// use scenes::rpc::{RpcInfoConfig, info};
 /// let image = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data-samples/town/view_1.tif");
 /// let report = info(&RpcInfoConfig::new(image.into()), &numeric::Silent)?;
 /// assert!(report.centre.is_some_and(|centre| centre.gsd_line_m > 0.1));
-/// # Ok::<(), scenes::rpc::RpcJobError>(())
+/// # Ok::<(), job::error::JobError>(())
 /// ```
-pub fn info(config: &RpcInfoConfig, progress: &dyn Progress) -> Result<RpcInfoReport, RpcJobError> {
+pub fn info(config: &RpcInfoConfig, progress: &dyn Progress) -> Result<RpcInfoReport, JobError> {
+    Ok(steps(config, progress)?)
+}
+
+fn steps(config: &RpcInfoConfig, progress: &dyn Progress) -> Result<RpcInfoReport, RpcJobError> {
     let file = input::read(&config.file, progress)?;
     let centre = centre(&file.rpc);
     if let Err(e) = &centre {

@@ -10,6 +10,7 @@ use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
 use camera::CameraError;
+use job::error::JobError;
 use serde::{Deserialize, Serialize};
 
 use super::error::{LineFault, RpcJobError};
@@ -60,8 +61,8 @@ impl RpcLinesConfig {
 /// Opens a file of points for [`answer_lines`].
 ///
 /// # Errors
-/// [`RpcJobError::Points`].
-pub fn open_lines(path: &Path) -> Result<Box<dyn BufRead>, RpcJobError> {
+/// [`JobError`] when the file cannot be read.
+pub fn open_lines(path: &Path) -> Result<Box<dyn BufRead>, JobError> {
     let file = File::open(path).map_err(|source| RpcJobError::Points { path: path.to_owned(), source })?;
     Ok(Box::new(BufReader::new(file)))
 }
@@ -69,8 +70,8 @@ pub fn open_lines(path: &Path) -> Result<Box<dyn BufRead>, RpcJobError> {
 /// Answers every line of `input`, in order, through `receive`.
 ///
 /// # Errors
-/// [`RpcJobError::Read`], [`RpcJobError::Line`] at the first line without three numbers,
-/// [`RpcJobError::Output`] when `receive` fails, [`RpcJobError::Cancelled`].
+/// [`JobError`] without a usable RPC, at the first line without three numbers, when `receive`
+/// fails, and when the job is cancelled.
 ///
 /// ```
 /// use scenes::rpc::{RpcDirection, RpcLinesConfig, answer_lines};
@@ -79,14 +80,14 @@ pub fn open_lines(path: &Path) -> Result<Box<dyn BufRead>, RpcJobError> {
 /// let mut lines = &b"# sample line height\n100 50 60\n120, 50, 60\n"[..];
 /// let report = answer_lines(&config, &mut lines, &mut |_| Ok(()), &numeric::Silent)?;
 /// assert_eq!((report.answered, report.failed), (2, 0));
-/// # Ok::<(), scenes::rpc::RpcJobError>(())
+/// # Ok::<(), job::error::JobError>(())
 /// ```
 pub fn answer_lines(
     config: &RpcLinesConfig,
     input: &mut dyn BufRead,
     receive: &mut dyn FnMut(RpcLineAnswer) -> std::io::Result<()>,
     progress: &dyn Progress,
-) -> Result<RpcLinesReport, RpcJobError> {
+) -> Result<RpcLinesReport, JobError> {
     let rpc = input::read(&config.file, progress)?.rpc;
     let mut report = RpcLinesReport::default();
     for line in 1.. {

@@ -18,7 +18,6 @@ mod points;
 mod text;
 
 pub use convert::{RpcConvertConfig, RpcConvertReport, convert};
-pub use error::RpcJobError;
 pub use export::{RpcExportConfig, RpcExportReport, RpcExportedImage, export};
 pub use info::{RpcCentre, RpcInfoConfig, RpcInfoReport, RpcValidity, info};
 pub use lines::{RpcLineAnswer, RpcLinesConfig, RpcLinesReport, answer_lines, open_lines};

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use camera::{CameraError, ImagePoint, Rpc};
 use geodesy::LonLatHeight;
+use job::error::JobError;
 use serde::{Deserialize, Serialize};
 
 use super::error::RpcJobError;
@@ -97,8 +98,7 @@ impl RpcQuery {
 /// Projects and localizes points.
 ///
 /// # Errors
-/// [`RpcJobError::Read`], [`RpcJobError::NoAnswer`] at the first point without an answer,
-/// [`RpcJobError::Cancelled`].
+/// [`JobError`] without a usable RPC, and at the first point without an answer.
 ///
 /// ```
 /// use camera::ImagePoint;
@@ -109,9 +109,9 @@ impl RpcQuery {
 /// let back = RpcQuery::Project(answer.ground);
 /// let back = points(&RpcPointsConfig::new(image.into(), vec![back]), &numeric::Silent)?.points[0];
 /// assert!((back.image.sample - 100.0).abs() < 1e-4);
-/// # Ok::<(), scenes::rpc::RpcJobError>(())
+/// # Ok::<(), job::error::JobError>(())
 /// ```
-pub fn points(config: &RpcPointsConfig, progress: &dyn Progress) -> Result<RpcPointsReport, RpcJobError> {
+pub fn points(config: &RpcPointsConfig, progress: &dyn Progress) -> Result<RpcPointsReport, JobError> {
     let rpc = input::read(&config.file, progress)?.rpc;
     let answer = |query: &RpcQuery| {
         query.answer(&rpc).map_err(|source| RpcJobError::NoAnswer { point: query.numbers(), source })

@@ -9,7 +9,7 @@ use numeric::Progress;
 use serde::{Deserialize, Serialize};
 
 use super::error::SplatsJobError;
-use job::error::SettingError;
+use job::error::{JobError, SettingError};
 use job::files;
 use job::threads::install;
 
@@ -108,7 +108,7 @@ impl SplatConvertReport {
 /// Converts splats.
 ///
 /// # Errors
-/// [`SplatsJobError`]: settings out of their range, a file that holds no splats, an output that
+/// [`JobError`]: settings out of their range, a file that holds no splats, an output that
 /// exists or cannot hold them.
 ///
 /// ```
@@ -121,7 +121,11 @@ impl SplatConvertReport {
 /// assert!(4 * report.bytes < report.bytes_before);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn convert(config: &SplatConvertConfig, progress: &dyn Progress) -> Result<SplatConvertReport, SplatsJobError> {
+pub fn convert(config: &SplatConvertConfig, progress: &dyn Progress) -> Result<SplatConvertReport, JobError> {
+    Ok(steps(config, progress)?)
+}
+
+fn steps(config: &SplatConvertConfig, progress: &dyn Progress) -> Result<SplatConvertReport, SplatsJobError> {
     config.validate()?;
     files::check_destination(&config.output, config.overwrite)?;
     install(config.threads, || {

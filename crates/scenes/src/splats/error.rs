@@ -15,7 +15,7 @@ use io::splat_ply::{LocalOrigin, SplatPlyError};
 use numeric::{Cancelled, failures};
 
 use job::corrections::CorrectionsError;
-use job::error::{ImageInputError, JobError, SettingError, from_steps};
+use job::error::{ImageInputError, JobError, SettingError, from_steps, job_errors};
 use job::files::FileError;
 use job::map_surface::MapSurfaceError;
 use job::placed_model::PlacedModelError;
@@ -23,8 +23,7 @@ use job::threads::ThreadsError;
 
 /// Splats that could not be made or rendered.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum SplatsJobError {
+pub(crate) enum SplatsJobError {
     /// The surface model cannot be used.
     #[error(transparent)]
     Surface(#[from] MapSurfaceError),
@@ -165,6 +164,11 @@ failures!(SplatsJobError: Other {
     Self::Priors(error) => error.kind(),
     Self::Transform(error) => error.kind(),
     Self::Job(error) => error.kind(),
+});
+
+job_errors!(SplatsJobError {
+    Self::NoCamera => Some("the cameras"),
+    Self::NotPlaced { .. } => Some("the place of the splats"),
 });
 
 from_steps!(SplatsJobError: Job(FileError, ThreadsError, SettingError, Cancelled), Image(RasterError, RpcReadError, CorrectionsError));

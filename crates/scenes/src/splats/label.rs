@@ -24,7 +24,7 @@ use super::make::pointing_path;
 use crate::priors::with_table;
 use job::corrections::Corrections;
 use job::dataset_folder::{UNKNOWN_DATUM, UNKNOWN_FRAME};
-use job::error::SettingError;
+use job::error::{JobError, SettingError};
 use job::files;
 use job::threads::install;
 
@@ -133,7 +133,7 @@ impl SplatLabelReport {
 /// Labels splats.
 ///
 /// # Errors
-/// [`SplatsJobError`]: settings out of their range, files that hold no splats or no city model,
+/// [`JobError`]: settings out of their range, files that hold no splats or no city model,
 /// splats and a model that do not lie on one map, an output that exists.
 ///
 /// ```
@@ -147,10 +147,10 @@ impl SplatLabelReport {
 /// assert!(report.objects > 0 && report.labelled < report.splats);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn label(config: &SplatLabelConfig, progress: &dyn Progress) -> Result<SplatLabelReport, SplatsJobError> {
+pub fn label(config: &SplatLabelConfig, progress: &dyn Progress) -> Result<SplatLabelReport, JobError> {
     config.validate()?;
     files::check_destination(&config.output, config.overwrite)?;
-    install(config.threads, || label_and_write(config, progress))?
+    Ok(install(config.threads, || label_and_write(config, progress))??)
 }
 
 fn label_and_write(config: &SplatLabelConfig, progress: &dyn Progress) -> Result<SplatLabelReport, SplatsJobError> {

@@ -18,6 +18,7 @@ use super::convert::format_of;
 use super::error::SplatsJobError;
 use super::image::{self, ColourImage};
 use job::corrections::{CorrectionSource, Corrections};
+use job::error::JobError;
 use job::files::{self, FileError};
 use job::map_surface::{self, MapSurface};
 use job::output_folder::OutputFolder;
@@ -159,7 +160,7 @@ impl SplatsReport {
 /// Makes splats of a surface model and its images and writes them.
 ///
 /// # Errors
-/// [`SplatsJobError`]: an input that cannot be used, bounds that are not positive, an output that
+/// [`JobError`]: an input that cannot be used, bounds that are not positive, an output that
 /// exists.
 ///
 /// ```
@@ -173,7 +174,11 @@ impl SplatsReport {
 /// assert!(report.made.splats < report.made.cells && config.output.is_file());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn make(config: &SplatsConfig, progress: &dyn Progress) -> Result<SplatsReport, SplatsJobError> {
+pub fn make(config: &SplatsConfig, progress: &dyn Progress) -> Result<SplatsReport, JobError> {
+    Ok(steps(config, progress)?)
+}
+
+fn steps(config: &SplatsConfig, progress: &dyn Progress) -> Result<SplatsReport, SplatsJobError> {
     format_of(&config.output)?;
     files::check_destination(&config.output, config.overwrite)?;
     if let Some(path) = &config.report {

@@ -17,7 +17,6 @@ mod text;
 pub(crate) use make::pointing_path;
 
 pub use convert::{SplatConvertConfig, SplatConvertReport, convert};
-pub use error::SplatsJobError;
 pub use label::{SplatLabelConfig, SplatLabelReport, label};
 pub use make::{SplatsConfig, SplatsImageReport, SplatsReport, make};
 pub use render::{SplatRenderConfig, SplatRenderReport, SplatRenderView, render};

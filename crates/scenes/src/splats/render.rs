@@ -34,7 +34,7 @@ use super::make::pointing_path;
 use crate::small_view::{pinhole, shrunk};
 use job::corrections::{CorrectionSource, Corrections};
 use job::dataset_folder::{UNKNOWN_DATUM, UNKNOWN_FRAME, dataset_folder, sparse_folder};
-use job::error::SettingError;
+use job::error::{JobError, SettingError};
 use job::files::{self, FileError};
 use job::output_folder::OutputFolder;
 use job::placed_model::{self, PlacedModelError};
@@ -137,10 +137,10 @@ impl SplatRenderConfig {
     /// Checks that there is a camera.
     ///
     /// # Errors
-    /// [`SplatsJobError::NoCamera`], or a factor outside of its range.
-    pub fn validate(&self) -> Result<(), SplatsJobError> {
+    /// [`JobError`] without images and cameras, and for a factor outside of its range.
+    pub fn validate(&self) -> Result<(), JobError> {
         if self.images.is_empty() && self.cameras.is_none() {
-            return Err(SplatsJobError::NoCamera);
+            return Err(SplatsJobError::NoCamera.into());
         }
         if !(1..=64).contains(&self.shrink) {
             return Err(SettingError::new("the factor that images shrink by", self.shrink, "1 to 64").into());
@@ -152,7 +152,7 @@ impl SplatRenderConfig {
 /// Renders splats through all cameras, compares them with the pictures and writes the folder.
 ///
 /// # Errors
-/// [`SplatsJobError`]: splats without an origin, cameras on another map, two views of one name, an
+/// [`JobError`]: splats without an origin, cameras on another map, two views of one name, an
 /// output that exists.
 ///
 /// ```
@@ -168,7 +168,11 @@ impl SplatRenderConfig {
 /// assert!(report.views[0].psnr_db.is_some_and(|psnr| psnr > 15.0));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn render(config: &SplatRenderConfig, progress: &dyn Progress) -> Result<SplatRenderReport, SplatsJobError> {
+pub fn render(config: &SplatRenderConfig, progress: &dyn Progress) -> Result<SplatRenderReport, JobError> {
+    Ok(steps(config, progress)?)
+}
+
+fn steps(config: &SplatRenderConfig, progress: &dyn Progress) -> Result<SplatRenderReport, SplatsJobError> {
     let report_path = config.output.join(REPORT);
     report_page::refuse_existing(&report_path, config.overwrite)?;
     config.validate()?;

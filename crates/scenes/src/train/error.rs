@@ -14,15 +14,14 @@ use numeric::{Cancelled, failures};
 
 use job::corrections::CorrectionsError;
 use job::dataset_folder::DatasetOriginError;
-use job::error::{ImageInputError, JobError, SettingError, from_steps};
+use job::error::{ImageInputError, JobError, SettingError, from_steps, job_errors};
 use job::files::FileError;
 use job::map_surface::MapSurfaceError;
 use job::threads::ThreadsError;
 
 /// A training that gives no splats.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum TrainError {
+pub(crate) enum TrainError {
     /// The cameras or points cannot be read.
     #[error(transparent)]
     Model(#[from] ColmapError),
@@ -157,6 +156,8 @@ failures!(TrainError: Other {
     Self::Origin(error) => error.kind(),
     Self::Job(error) => error.kind(),
 });
+
+job_errors!(TrainError);
 
 from_steps!(
     TrainError: Job(FileError, ThreadsError, SettingError, Cancelled),

@@ -37,7 +37,7 @@ mod transients;
 pub(crate) use place::DatasetPlace;
 
 pub use config::{PriorSchedule, TrainConfig, TrainPriors};
-pub use error::TrainError;
+pub(crate) use error::TrainError;
 pub use recipe::{TrainNumbers, TrainPreset, TrainSchedule, TrainSteps, TrainWeights};
 pub use report::{LossPoint, TrainReport, TrainedViewRow};
 pub use run::run;

@@ -19,6 +19,7 @@ use super::page;
 use super::recipe::{self, TrainPreset};
 use super::report::{Exposed, Quality, TrainReport, TrainedViewRow};
 use super::results::{self, CHECKPOINT, RENDERS, REPORT};
+use job::error::JobError;
 use job::files;
 use job::output_folder::OutputFolder;
 use job::threads;
@@ -29,17 +30,17 @@ use job::threads;
 /// result has the same bytes.
 ///
 /// # Errors
-/// [`TrainError`]: a dataset that cannot be read or has no images, outputs that exist.
-pub fn run(config: &TrainConfig, progress: &dyn Progress) -> Result<TrainReport, TrainError> {
+/// [`JobError`]: a dataset that cannot be read or has no images, outputs that exist.
+pub fn run(config: &TrainConfig, progress: &dyn Progress) -> Result<TrainReport, JobError> {
     config.validate()?;
     let (overwrite, resume) = (config.overwrite, config.resume);
     let may_replace = results::may_replace(&config.output, overwrite, resume, config.iterations)?;
-    threads::install(config.threads, || {
+    Ok(threads::install(config.threads, || {
         let data = TrainData::read(config, progress)?;
         let folder = OutputFolder::take(&config.output)?;
         folder.check_folders([RENDERS])?;
         train(config, &data, &folder, may_replace, progress)
-    })?
+    })??)
 }
 
 fn train(

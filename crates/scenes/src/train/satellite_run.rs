@@ -21,7 +21,7 @@ use super::results::{self, CHECKPOINT, RENDERS, REPORT};
 use super::satellite::{PlacedSurfels, SatelliteImage, corrections};
 use crate::splats::pointing_path;
 use job::corrections::CorrectionSource;
-use job::error::SettingError;
+use job::error::{JobError, SettingError};
 use job::files::{self, FileError};
 use job::map_surface::{self, MapSurface};
 use job::output_folder::OutputFolder;
@@ -186,16 +186,13 @@ impl SatelliteTrainReport {
 /// result has the same bytes.
 ///
 /// # Errors
-/// [`TrainError`]: splats without an origin on a map, images that do not see them, outputs that
+/// [`JobError`]: splats without an origin on a map, images that do not see them, outputs that
 /// exist.
-pub fn run_on_images(
-    config: &SatelliteTrainConfig,
-    progress: &dyn Progress,
-) -> Result<SatelliteTrainReport, TrainError> {
+pub fn run_on_images(config: &SatelliteTrainConfig, progress: &dyn Progress) -> Result<SatelliteTrainReport, JobError> {
     config.validate()?;
     let (overwrite, resume) = (config.overwrite, config.resume);
     let may_replace = results::may_replace(&config.output, overwrite, resume, config.iterations)?;
-    threads::install(config.threads, || train(config, may_replace, progress))?
+    Ok(threads::install(config.threads, || train(config, may_replace, progress))??)
 }
 
 fn train(
