@@ -66,6 +66,9 @@ const FILE_CRATES: [&str; 9] = ["io", "cityfiles", "job", "surfaces", "dsm", "sc
 /// Most sources of a folder, so that its list is read at one look.
 const FOLDER_FILES: usize = 25;
 
+/// Most public enumerations of errors. The number goes down, and not up.
+const ERROR_ENUMS: usize = 55;
+
 /// Most lines of a crate, tests included.
 const CRATE_LINES: usize = 20_000;
 
@@ -284,6 +287,32 @@ fn errors_of_the_library_name_no_command_line_flags() {
         .collect();
     report(&broken);
     assert!(names::names_flag("give --gsd") && !names::names_flag("a -- b"));
+}
+
+#[test]
+fn public_error_enums_do_not_become_more() {
+    let found: Vec<String> = product_sources().iter().flat_map(|path| names::public_error_enums(path)).collect();
+    assert!(
+        found.len() <= ERROR_ENUMS,
+        "{} public enumerations of errors, at most {ERROR_ENUMS}: a job returns `job::error::JobError`, and what its \
+         steps pass to each other is private: {found:?}",
+        found.len()
+    );
+}
+
+/// Callers ask an error for its kind (`numeric::Failure`), and do not search in its text.
+#[test]
+fn nothing_is_searched_in_the_text_of_an_error() {
+    const SHORTEST: usize = 10;
+    let sources = product_sources();
+    let errors: Vec<String> = sources.iter().flat_map(|path| names::error_texts(path)).collect();
+    let broken: Vec<String> = sources
+        .iter()
+        .flat_map(|path| names::searched_texts(path).into_iter().map(move |text| (path, text)))
+        .filter(|(_, text)| text.len() >= SHORTEST && errors.iter().any(|error| error.contains(text.as_str())))
+        .map(|(path, text)| format!("{}: {text:?} is in the text of an error: match its kind", path.display()))
+        .collect();
+    report(&broken);
 }
 
 /// A job hands values to another one. The folders in which a job prepares its outputs lie in the

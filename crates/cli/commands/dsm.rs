@@ -5,12 +5,11 @@ use std::path::{Path, PathBuf};
 use crs::{CrsRequest, VerticalDatum};
 use io::raster::BandChoice;
 use jobs::dsm::job_file::read_dsm_job;
-use jobs::dsm::{
-    DsmConfig, DsmError, DsmReport, DsmSetting, Fill, HeightRange, ImagePair, LayerArea, MapBounds, Preset, SweepError,
-};
+use jobs::dsm::{DsmConfig, DsmError, DsmReport, Fill, HeightRange, ImagePair, LayerArea, MapBounds, Preset};
+use jobs::error::JobError;
 use jobs::image_files::image_files;
 use jobs::job_file::is_job_file;
-use jobs::production::{ProductionError, make_plan};
+use jobs::production::make_plan;
 use jobs::products::ProductKind;
 
 use crate::error::with_hint;
@@ -235,55 +234,46 @@ pub(crate) fn print(show: ShowOptions, global: Global, report: &DsmReport, outpu
 }
 
 fn hinted(error: DsmError) -> anyhow::Error {
-    let hint = hint(&error);
+    let hint = error.setting().and_then(hint);
     with_hint(error, hint)
 }
 
 /// Adds the option that helps with an error of a planned run.
-pub(crate) fn production_hinted(error: ProductionError) -> anyhow::Error {
-    let hint = match &error {
-        ProductionError::Dsm(error) => hint(error),
-        ProductionError::NoPlan { .. } => Some("skysweep plan IMAGES… -o RUN makes one"),
-        ProductionError::OtherVersion { .. }
-        | ProductionError::ConfigChanged { .. }
-        | ProductionError::InputChanged { .. }
-        | ProductionError::InputAdded { .. } => Some("skysweep run RUN --resume plans and computes again"),
-        ProductionError::ChunksMissing { .. } => Some("skysweep run RUN computes them, --partial leaves them void"),
-        _ => None,
+pub(crate) fn production_hinted(error: JobError) -> anyhow::Error {
+    let hint = match error.setting() {
+        Some("the plan") => Some("skysweep plan IMAGES… -o RUN makes one"),
+        Some("what the plan rests on") => Some("skysweep run RUN --resume plans and computes again"),
+        Some("the chunks") => Some("skysweep run RUN computes them, --partial leaves them void"),
+        other => other.and_then(hint),
     };
     with_hint(error, hint)
 }
 
-/// Returns the options that help against an error.
-fn hint(error: &DsmError) -> Option<&'static str> {
-    Some(match error {
-        DsmError::NoPointing { .. } => "--no-pointing uses the RPCs as they are",
-        DsmError::NoTies { .. } => "--height-range LO HI gives the heights to search, and --dem takes them from a file",
-        DsmError::RangeMissesScene { .. } => "without --height-range the heights are found from tie points",
-        DsmError::Memory { .. } => "--memory MB raises the limit, and --bounds makes the area smaller",
-        DsmError::BoundsMissScene { .. } => "without --bounds the DSM covers all the ground that two images see",
-        DsmError::AreaMissesScene { .. } => "without --area the DSM covers all the ground that two images see",
-        DsmError::Prior { .. } => "`skysweep city info MODEL` checks a city model",
-        DsmError::Value { setting, .. } => match setting {
-            DsmSetting::Output => "-o DIR names it",
-            DsmSetting::CellSize => "the cell size is set by --gsd",
-            DsmSetting::Crs => "the CRS is set by --crs; --force uses it outside its area of use",
-            DsmSetting::Bounds => "the grid is set by --bounds and --gsd",
-            DsmSetting::HeightRange => "the heights are set by --height-range",
-            DsmSetting::Dem => "the elevation model is set by --dem",
-            DsmSetting::ReferenceDem => "the reference is set by --reference-dem, its datum by --dem-vertical",
-            DsmSetting::Masks => "masks on the ground are set by --mask, masks of single images by --image-mask",
-            DsmSetting::ImageMasks => "masks of single images are set by --image-mask",
-            DsmSetting::Pairs => "the pairs are set by --pairs",
-            DsmSetting::References => "the images to compute heights for are set by --reference",
-            DsmSetting::Threads => "the number of threads is set by --threads",
-            DsmSetting::ChunkSide => "the chunks are set by --chunk",
-            DsmSetting::TileSide => "the tiles are set by --tile",
-            _ => return None,
-        },
-        DsmError::Sweep(SweepError::TooManyHypotheses { .. } | SweepError::HeightsTooFar { .. }) => {
-            "--height-range LO HI gives the heights to search"
-        }
+/// Returns the options that help with a setting or an input.
+fn hint(setting: &str) -> Option<&'static str> {
+    Some(match setting {
+        "the pointing" => "--no-pointing uses the RPCs as they are",
+        "the heights to search" => "--height-range LO HI gives the heights to search, and --dem takes them from a file",
+        "the heights" => "--height-range LO HI gives the heights to search",
+        "the given height range" => "without --height-range the heights are found from tie points",
+        "the limit of memory" => "--memory MB raises the limit, and --bounds makes the area smaller",
+        "the given bounds" => "without --bounds the DSM covers all the ground that two images see",
+        "the area" => "without --area the DSM covers all the ground that two images see",
+        "the city model" => "`skysweep city info MODEL` checks a city model",
+        "the output folder" => "-o DIR names it",
+        "the cell size" => "the cell size is set by --gsd",
+        "the coordinate reference system" => "the CRS is set by --crs; --force uses it outside its area of use",
+        "the bounds" => "the grid is set by --bounds and --gsd",
+        "the height range" => "the heights are set by --height-range",
+        "the elevation model" => "the elevation model is set by --dem",
+        "the reference elevation model" => "the reference is set by --reference-dem, its datum by --dem-vertical",
+        "the mask" => "masks on the ground are set by --mask, masks of single images by --image-mask",
+        "the mask of an image" => "masks of single images are set by --image-mask",
+        "the list of image pairs" => "the pairs are set by --pairs",
+        "the list of reference images" => "the images to compute heights for are set by --reference",
+        "the number of threads" => "the number of threads is set by --threads",
+        "the side of the chunks" => "the chunks are set by --chunk",
+        "the side of the tiles" => "the tiles are set by --tile",
         _ => return None,
     })
 }

@@ -2,7 +2,8 @@
 
 use std::path::PathBuf;
 
-use jobs::products::{ProductKind, ProductsConfig, ProductsError};
+use jobs::error::JobError;
+use jobs::products::{ProductKind, ProductsConfig};
 
 use crate::error::with_hint;
 use crate::options::named;
@@ -58,12 +59,7 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
 }
 
 /// Adds the option that helps with an error.
-pub(crate) fn hinted(error: ProductsError) -> anyhow::Error {
-    let hint = match &error {
-        ProductsError::Images(_) | ProductsError::Ortho(_) | ProductsError::OrthoElsewhere { .. } => {
-            Some("--ortho gives one, --only names the products that need no colours")
-        }
-        _ => None,
-    };
-    with_hint(error, hint)
+pub(crate) fn hinted(error: JobError) -> anyhow::Error {
+    let needs_ortho = error.setting() == Some("the ortho");
+    with_hint(error, needs_ortho.then_some("--ortho gives one, --only names the products that need no colours"))
 }

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use jobs::view::{ViewConfig, ViewError, ViewServer};
+use jobs::view::{ViewConfig, ViewServer};
 use numeric::Choice;
 
 use crate::error::with_hint;
@@ -52,7 +52,7 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
         viewer.serve(watcher)
     });
     let report = report.map_err(|error| {
-        let hint = matches!(error, ViewError::Port { .. }).then_some("leave --port out for a free one");
+        let hint = (error.setting() == Some("the port")).then_some("leave --port out for a free one");
         with_hint(error, hint)
     })?;
     args.show.print(global, &report, || report.text())?;

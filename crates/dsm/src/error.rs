@@ -5,11 +5,12 @@ use std::path::PathBuf;
 
 use numeric::{Failure, Kind, failures};
 use report::plain_number;
+use sweep::SweepError;
 
 use crate::products::ProductsError;
 use crate::values::{HeightRange, MapBounds};
 use job::corrections::CorrectionsError;
-use job::error::from_steps;
+use job::error::{JobError, from_steps};
 use job::files::FileError;
 use job::threads::ThreadsError;
 
@@ -49,9 +50,10 @@ pub enum DsmSetting {
     TileSide,
 }
 
-impl fmt::Display for DsmSetting {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
+impl DsmSetting {
+    /// Returns the setting in words.
+    pub fn in_words(self) -> &'static str {
+        match self {
             Self::Output => "the output folder",
             Self::CellSize => "the cell size",
             Self::Crs => "the coordinate reference system",
@@ -67,7 +69,13 @@ impl fmt::Display for DsmSetting {
             Self::Threads => "the number of threads",
             Self::ChunkSide => "the side of the chunks",
             Self::TileSide => "the side of the tiles",
-        })
+        }
+    }
+}
+
+impl fmt::Display for DsmSetting {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.in_words())
     }
 }
 
@@ -321,7 +329,7 @@ pub enum DsmError {
     File(FileError),
     /// The DSM is complete, but a product of it could not be made.
     #[error("the surface model is complete, but a product of it could not be made")]
-    Products(#[source] Box<ProductsError>),
+    Products(#[source] Box<JobError>),
     /// A stored result of a chunk cannot be read.
     #[error("cannot read the result of a chunk ({reason}): {}", path.display())]
     ChunkFile {
@@ -364,7 +372,7 @@ pub enum DsmError {
     Crs(#[from] crs::CrsError),
     /// The height sweep failed.
     #[error("the height sweep failed")]
-    Sweep(#[from] sweep::SweepError),
+    Sweep(#[from] SweepError),
     /// The worker threads cannot be started.
     #[error(transparent)]
     Threads(#[from] ThreadsError),
@@ -411,6 +419,22 @@ pub(crate) fn axes_hint(found: MapBounds, scene: MapBounds) -> &'static str {
 }
 
 impl DsmError {
+    /// Returns the setting or the input that the error is about, in words.
+    pub fn setting(&self) -> Option<&'static str> {
+        Some(match self {
+            Self::NoPointing { .. } => "the pointing",
+            Self::NoTies { .. } => "the heights to search",
+            Self::Sweep(SweepError::TooManyHypotheses { .. } | SweepError::HeightsTooFar { .. }) => "the heights",
+            Self::RangeMissesScene { .. } => "the given height range",
+            Self::Memory { .. } => "the limit of memory",
+            Self::BoundsMissScene { .. } => "the given bounds",
+            Self::AreaMissesScene { .. } => "the area",
+            Self::Prior { .. } => "the city model",
+            Self::Value { setting, .. } => setting.in_words(),
+            _ => return None,
+        })
+    }
+
     /// Makes the error of a setting with a wrong value.
     pub(crate) fn value(setting: DsmSetting, found: impl Into<String>, expected: impl Into<String>) -> Self {
         Self::Value { setting, found: found.into(), expected: expected.into() }
@@ -442,7 +466,7 @@ impl From<ProductsError> for DsmError {
     fn from(error: ProductsError) -> Self {
         match error {
             error if error.kind() == Kind::Cancelled => Self::Cancelled,
-            other => Self::Products(Box::new(other)),
+            other => Self::Products(Box::new(other.into())),
         }
     }
 }

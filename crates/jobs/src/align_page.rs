@@ -91,7 +91,7 @@ impl AlignPage {
     /// # Errors
     /// As [`ViewServer::open_browser`].
     pub fn open_browser(&self) -> Result<(), JobError> {
-        Ok(self.server.open_browser()?)
+        self.server.open_browser()
     }
 
     /// Answers the page until the job is cancelled or its time is over.

@@ -11,8 +11,7 @@ use job::error::{JobError, SettingError, from_steps, job_errors};
 
 /// A viewer that cannot be opened.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum ViewError {
+pub(crate) enum ViewError {
     /// A raster cannot be read.
     #[error(transparent)]
     Raster(#[from] RasterError),

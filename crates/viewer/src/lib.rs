@@ -37,7 +37,6 @@ mod styles;
 mod vectors;
 
 pub use config::ViewConfig;
-pub use error::ViewError;
 pub use frame::MapFrame;
 pub use page_job::{PageData, PageJob};
 pub use report::ViewerReport;

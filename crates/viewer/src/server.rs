@@ -8,6 +8,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
+use job::error::JobError;
 use numeric::Progress;
 use tokio::sync::mpsc;
 
@@ -48,8 +49,12 @@ impl ViewServer {
     /// Finds the layers, and listens on 127.0.0.1. Warnings say what is left out.
     ///
     /// # Errors
-    /// [`ViewError`]: a setting out of range, rasters that cannot be read, a port that is taken.
-    pub fn open(config: &ViewConfig, progress: &dyn Progress) -> Result<Self, ViewError> {
+    /// [`JobError`]: a setting out of range, rasters that cannot be read, a port that is taken.
+    pub fn open(config: &ViewConfig, progress: &dyn Progress) -> Result<Self, JobError> {
+        Ok(Self::opened(config, progress)?)
+    }
+
+    fn opened(config: &ViewConfig, progress: &dyn Progress) -> Result<Self, ViewError> {
         config.validate()?;
         let mut space = Space::open(&config.inputs, progress)?;
         let rasters = ViewConfig { inputs: space.others(&config.inputs), ..config.clone() };
@@ -78,8 +83,8 @@ impl ViewServer {
     /// is an argument of that program, which other users of this computer may be able to see.
     ///
     /// # Errors
-    /// [`ViewError::Browser`] when there is no such program.
-    pub fn open_browser(&self) -> Result<(), ViewError> {
+    /// [`JobError`] when there is no such program.
+    pub fn open_browser(&self) -> Result<(), JobError> {
         let program = match std::env::consts::OS {
             "macos" => "open",
             "windows" => "explorer",
@@ -87,23 +92,23 @@ impl ViewServer {
         };
         let mut command = Command::new(program);
         command.arg(self.url()).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
-        command.spawn().map(drop).map_err(ViewError::Browser)
+        Ok(command.spawn().map(drop).map_err(ViewError::Browser)?)
     }
 
     /// Returns the frame of the map, and its ground as far as its rasters have heights.
     ///
     /// # Errors
-    /// [`ViewError::Raster`] when the heights cannot be read.
-    pub fn map_frame(&self) -> Result<Option<MapFrame>, ViewError> {
+    /// [`JobError`] when the heights cannot be read.
+    pub fn map_frame(&self) -> Result<Option<MapFrame>, JobError> {
         Ok(MapFrame::of(&self.scene)?)
     }
 
     /// Answers requests until the job is cancelled or the time of the configuration is over.
     ///
     /// # Errors
-    /// [`ViewError::Thread`] when the system starts no threads.
-    pub fn serve(&self, progress: &dyn Progress) -> Result<ViewerReport, ViewError> {
-        self.answer_all(None, progress)
+    /// [`JobError`] when the system starts no threads.
+    pub fn serve(&self, progress: &dyn Progress) -> Result<ViewerReport, JobError> {
+        Ok(self.answer_all(None, progress)?)
     }
 
     /// Answers as [`Self::serve`] does, with a page for a job behind it in the place of the map's
@@ -111,8 +116,8 @@ impl ViewServer {
     ///
     /// # Errors
     /// As [`Self::serve`].
-    pub fn serve_job(&self, job: &dyn PageJob, progress: &dyn Progress) -> Result<ViewerReport, ViewError> {
-        self.answer_all(Some(job), progress)
+    pub fn serve_job(&self, job: &dyn PageJob, progress: &dyn Progress) -> Result<ViewerReport, JobError> {
+        Ok(self.answer_all(Some(job), progress)?)
     }
 
     fn answer_all(&self, job: Option<&dyn PageJob>, progress: &dyn Progress) -> Result<ViewerReport, ViewError> {

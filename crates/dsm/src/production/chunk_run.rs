@@ -14,6 +14,7 @@ use crate::production::error::ProductionError;
 use crate::production::plan_file::PlanFile;
 use crate::production::plan_run::plan_again;
 use crate::{ChunkContent, ChunkResult, DsmError, InputStamps, Session, run_chunk};
+use job::error::JobError;
 use job::error_text::with_causes;
 use job::output_folder::OutputFolder;
 use job::threads;
@@ -93,14 +94,15 @@ impl ChunkRunReport {
 /// in the same folder at the same time.
 ///
 /// # Errors
-/// [`ProductionError::NoPlan`], [`ProductionError::Plan`], [`ProductionError::OtherPlan`];
-/// [`ProductionError::OtherVersion`],
-/// [`ProductionError::ConfigChanged`], [`ProductionError::InputChanged`],
-/// [`ProductionError::InputAdded`] unless the run is resumed;
-/// [`ProductionError::File`], [`ProductionError::Threads`]; [`ProductionError::Dsm`] for a chunk
-/// that the plan does not have, for inputs that change meanwhile, and when cancelled. A chunk that
+/// [`JobError`]: no plan, or one that is damaged or was replaced; another version, configuration or
+/// input than was planned, unless the run is resumed; a chunk that the plan does not have, inputs
+/// that change meanwhile, and when cancelled. A chunk that
 /// fails is no error.
-pub fn run_chunks(config: &ChunkRunConfig, progress: &dyn Progress) -> Result<ChunkRunReport, ProductionError> {
+pub fn run_chunks(config: &ChunkRunConfig, progress: &dyn Progress) -> Result<ChunkRunReport, JobError> {
+    Ok(steps(config, progress)?)
+}
+
+fn steps(config: &ChunkRunConfig, progress: &dyn Progress) -> Result<ChunkRunReport, ProductionError> {
     let (_share, file) = current_plan(config, progress)?;
     file.require(config.plan.as_deref())?;
     let count = file.plan.chunks.len();

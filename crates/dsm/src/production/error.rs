@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use crate::DsmError;
+use job::error::{JobError, job_errors};
 use job::files::FileError;
 use job::job_file::JobFileError;
 use job::threads::ThreadsError;
@@ -10,8 +11,7 @@ use numeric::{Kind, failures};
 
 /// The reason why a planned run ended without a result.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum ProductionError {
+pub(crate) enum ProductionError {
     /// A stage of the surface model failed.
     #[error(transparent)]
     Dsm(#[from] DsmError),
@@ -20,7 +20,10 @@ pub enum ProductionError {
     File(#[from] FileError),
     /// The configuration in the run folder cannot be read.
     #[error(transparent)]
-    Job(#[from] JobFileError),
+    JobFile(#[from] JobFileError),
+    /// A step that is a job of its own ended without a result.
+    #[error(transparent)]
+    Job(#[from] JobError),
     /// The worker threads cannot be started.
     #[error(transparent)]
     Threads(#[from] ThreadsError),
@@ -111,10 +114,21 @@ pub enum ProductionError {
 failures!(ProductionError: Other {
     Self::Dsm(error) => error.kind(),
     Self::File(error) => error.kind(),
+    Self::JobFile(error) => error.kind(),
     Self::Job(error) => error.kind(),
     Self::Threads(error) => error.kind(),
     Self::OtherPlan { .. } => Kind::Input,
     Self::NoPlan { .. } | Self::Plan { .. } => Kind::File,
+});
+
+job_errors!(ProductionError {
+    Self::Dsm(error) => error.setting(),
+    Self::NoPlan { .. } => Some("the plan"),
+    Self::OtherVersion { .. }
+    | Self::ConfigChanged { .. }
+    | Self::InputChanged { .. }
+    | Self::InputAdded { .. } => Some("what the plan rests on"),
+    Self::ChunksMissing { .. } => Some("the chunks"),
 });
 
 impl ProductionError {

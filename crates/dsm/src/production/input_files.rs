@@ -14,6 +14,7 @@ use serde::{Deserialize, Serialize};
 use crate::production::content_hash;
 use crate::production::error::ProductionError;
 use crate::{DsmConfig, files_of};
+use job::error::JobError;
 use job::files::FileError;
 
 /// A file that a plan rests on.
@@ -57,8 +58,12 @@ impl InputFile {
 /// city model, ground points, corrections. Addresses are not among them.
 ///
 /// # Errors
-/// [`ProductionError::File`], [`ProductionError::Dsm`].
-pub fn inputs_of(config: &DsmConfig) -> Result<Vec<InputFile>, ProductionError> {
+/// [`JobError`] for a file that cannot be read.
+pub fn inputs_of(config: &DsmConfig) -> Result<Vec<InputFile>, JobError> {
+    Ok(stamped(config)?)
+}
+
+fn stamped(config: &DsmConfig) -> Result<Vec<InputFile>, ProductionError> {
     let files: Vec<PathBuf> = files_of(config)?.into_iter().collect();
     Ok(files.par_iter().map(|path| InputFile::of(path)).collect::<Result<_, _>>()?)
 }
@@ -74,8 +79,13 @@ pub fn added<'a>(files: &'a BTreeSet<PathBuf>, inputs: &[InputFile]) -> Option<&
 /// Compares files with what they were when they were planned.
 ///
 /// # Errors
-/// [`ProductionError::InputChanged`], [`ProductionError::File`] for a file that is gone.
-pub fn check(inputs: &[InputFile]) -> Result<(), ProductionError> {
+/// [`JobError`] for an input that was changed or is gone.
+pub fn check_inputs(inputs: &[InputFile]) -> Result<(), JobError> {
+    Ok(check(inputs)?)
+}
+
+/// Checks inputs as [`check_inputs`] does.
+pub(super) fn check(inputs: &[InputFile]) -> Result<(), ProductionError> {
     inputs.par_iter().try_for_each(|input| {
         let changed = || ProductionError::InputChanged { path: input.path.clone() };
         if input.is_unchanged()? { Ok(()) } else { Err(changed()) }

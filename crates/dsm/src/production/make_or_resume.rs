@@ -11,6 +11,7 @@ use crate::production::merge_run::{MergeConfig, merge_run};
 use crate::production::plan_file::PlanFile;
 use crate::production::plan_run::plan_run;
 use crate::{DsmConfig, DsmReport};
+use job::error::JobError;
 use job::files::FileError;
 use job::output_folder::OutputFolder;
 
@@ -20,7 +21,11 @@ use job::output_folder::OutputFolder;
 ///
 /// # Errors
 /// Those of [`plan_run`], [`run_chunks`] and [`merge_run`].
-pub fn make_or_resume(config: &DsmConfig, progress: &dyn Progress) -> Result<DsmReport, ProductionError> {
+pub fn make_or_resume(config: &DsmConfig, progress: &dyn Progress) -> Result<DsmReport, JobError> {
+    Ok(steps(config, progress)?)
+}
+
+fn steps(config: &DsmConfig, progress: &dyn Progress) -> Result<DsmReport, ProductionError> {
     config.validate()?;
     let planned = PlanFile::read_current(&config.output);
     let fits = planned.is_ok_and(|file| file.is_of(config) && file.check_inputs().is_ok());

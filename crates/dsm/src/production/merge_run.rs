@@ -10,6 +10,7 @@ use crate::production::error::ProductionError;
 use crate::production::plan_file::PlanFile;
 use crate::products;
 use crate::{ChunkResult, DsmError, DsmFolder, FILES, Merger, Product, StageTime, USED_CONFIG, refuse_results};
+use job::error::JobError;
 use job::output_folder::OutputFolder;
 use job::threads;
 
@@ -55,13 +56,15 @@ impl MergeConfig {
 /// Merges the chunks of a planned run. Failed chunks are void, and the report names them.
 ///
 /// # Errors
-/// [`ProductionError::NoPlan`], [`ProductionError::Plan`], [`ProductionError::OtherVersion`],
-/// [`ProductionError::OtherPlan`], [`ProductionError::ConfigChanged`];
-/// [`ProductionError::ChunksMissing`] and [`ProductionError::ChunkDamaged`] unless a partial result
-/// is allowed; [`ProductionError::NothingDone`]; [`ProductionError::Dsm`] for products that exist,
-/// for a folder in which chunks are computed, for what cannot be read or written, and when
+/// [`JobError`]: no plan, or another one than this version and configuration make; chunks that are
+/// missing or damaged unless a partial result is allowed; no chunk with a surface; products that
+/// exist, a folder in which chunks are computed, what cannot be read or written, and when
 /// cancelled. Nothing is left half-written.
-pub fn merge_run(config: &MergeConfig, progress: &dyn Progress) -> Result<Product, ProductionError> {
+pub fn merge_run(config: &MergeConfig, progress: &dyn Progress) -> Result<Product, JobError> {
+    Ok(steps(config, progress)?)
+}
+
+fn steps(config: &MergeConfig, progress: &dyn Progress) -> Result<Product, ProductionError> {
     // A folder without a plan is no run folder, and not worth a lock.
     PlanFile::read_current(&config.folder)?;
     let folder = OutputFolder::take(&config.folder).map_err(DsmError::from)?;

@@ -15,6 +15,7 @@ use crate::production::estimate::PlanEstimate;
 use crate::production::input_files::{self, InputFile};
 use crate::production::plan_cache::{LastRead, stamp};
 use crate::{DsmConfig, Plan, USED_CONFIG, files_of, open};
+use job::error::JobError;
 use job::files::TEXT_LIMIT;
 use job::job_paths::{relative, resolved};
 
@@ -75,9 +76,13 @@ impl PlanFile {
     /// Reads the plan in the folder of a run, unless this process has read it last.
     ///
     /// # Errors
-    /// [`ProductionError::NoPlan`], [`ProductionError::Plan`] for a file that is damaged or was
-    /// edited or whose parts do not fit each other, [`ProductionError::OtherVersion`].
-    pub fn read(folder: &Path) -> Result<Arc<Self>, ProductionError> {
+    /// [`JobError`]: no plan, a file that is damaged or was edited or whose parts do not fit each
+    /// other, another version.
+    pub fn read(folder: &Path) -> Result<Arc<Self>, JobError> {
+        Ok(Self::stored_in(folder)?)
+    }
+
+    fn stored_in(folder: &Path) -> Result<Arc<Self>, ProductionError> {
         let stamp = stamp(&folder.join(PLAN));
         if let Some(known) = LAST.kept(folder, stamp) {
             return Ok(known);
@@ -114,9 +119,9 @@ impl PlanFile {
     /// one that it was made from.
     ///
     /// # Errors
-    /// As [`Self::read`]; [`ProductionError::Job`], [`ProductionError::ConfigChanged`].
+    /// As [`Self::read`]; [`ProductionError::JobFile`], [`ProductionError::ConfigChanged`].
     pub(super) fn read_current(folder: &Path) -> Result<Arc<Self>, ProductionError> {
-        let file = Self::read(folder)?;
+        let file = Self::stored_in(folder)?;
         let path = folder.join(USED_CONFIG);
         if !same(&read_dsm_job(&path)?, &file.plan.config, folder) {
             return Err(ProductionError::ConfigChanged { path });

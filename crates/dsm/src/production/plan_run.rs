@@ -15,6 +15,7 @@ use crate::production::chunk_folder;
 use crate::production::error::ProductionError;
 use crate::production::input_files::inputs_of;
 use crate::production::plan_file::{PLAN, POINTING, PlanFile};
+use job::error::JobError;
 use job::files::write_json;
 use job::job_paths::resolved;
 use job::output_folder::OutputFolder;
@@ -31,8 +32,12 @@ struct PointingFile<'a> {
 /// Plans a run and writes nothing.
 ///
 /// # Errors
-/// [`ProductionError::Dsm`], [`ProductionError::File`], [`ProductionError::Threads`].
-pub fn make_plan(config: &DsmConfig, progress: &dyn Progress) -> Result<PlanFile, ProductionError> {
+/// [`JobError`]: a configuration or images that cannot be used.
+pub fn make_plan(config: &DsmConfig, progress: &dyn Progress) -> Result<PlanFile, JobError> {
+    Ok(steps(config, progress)?)
+}
+
+fn steps(config: &DsmConfig, progress: &dyn Progress) -> Result<PlanFile, ProductionError> {
     config.validate()?;
     Ok(stored_plan(config, progress)?.located(&config.output))
 }
@@ -60,7 +65,11 @@ fn chain(config: &DsmConfig, session: &mut Session<'_>) -> Result<Plan, DsmError
 /// # Errors
 /// As [`make_plan`]; [`DsmError::Exists`] for a folder with a plan or results, unless the
 /// configuration allows to replace them; [`DsmError::InUse`].
-pub fn plan_run(config: &DsmConfig, progress: &dyn Progress) -> Result<PlanFile, ProductionError> {
+pub fn plan_run(config: &DsmConfig, progress: &dyn Progress) -> Result<PlanFile, JobError> {
+    Ok(planned(config, progress)?)
+}
+
+fn planned(config: &DsmConfig, progress: &dyn Progress) -> Result<PlanFile, ProductionError> {
     config.validate()?;
     let folder = OutputFolder::take(&config.output).map_err(DsmError::from)?;
     if !config.overwrite {
@@ -104,7 +113,7 @@ fn write(folder: &OutputFolder, config: &DsmConfig, file: &PlanFile) -> Result<(
 /// Does nothing when another process was faster, and the plan fits.
 ///
 /// # Errors
-/// As [`plan_run`]; [`ProductionError::Job`].
+/// As [`plan_run`]; [`ProductionError::JobFile`].
 pub(super) fn plan_again(
     folder: &Path,
     threads: Option<usize>,

@@ -6,15 +6,14 @@ use crs::CrsError;
 use io::raster::RasterError;
 use numeric::{Cancelled, Failure, Kind, failures};
 
-use job::error::{JobError, SettingError, from_steps};
+use job::error::{JobError, SettingError, from_steps, job_errors};
 use job::files::FileError;
 use job::job_file::JobFileError;
 use job::threads::ThreadsError;
 
 /// Products that cannot be made.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum ProductsError {
+pub(crate) enum ProductsError {
     /// The folder is not that of a finished run.
     #[error("expected the folder of a finished DSM run, found no {}", missing.display())]
     NotARun {
@@ -94,6 +93,10 @@ failures!(ProductsError: Other {
     Self::Classes(error) => error.kind(),
     Self::Crs(error) => error.kind(),
     Self::Job(error) => error.kind(),
+});
+
+job_errors!(ProductsError {
+    Self::Images(_) | Self::Ortho(_) | Self::OrthoElsewhere { .. } => Some("the ortho"),
 });
 
 from_steps!(ProductsError: Job(SettingError, FileError, ThreadsError, Cancelled));

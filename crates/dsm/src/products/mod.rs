@@ -29,7 +29,7 @@ pub use cloud::CloudReport;
 pub use colour::ColourReport;
 pub use config::ProductsConfig;
 pub use contours::ContoursReport;
-pub use error::ProductsError;
+pub(crate) use error::ProductsError;
 pub use mesh::MeshReport;
 pub use product::ProductKind;
 pub use report::ProductsReport;

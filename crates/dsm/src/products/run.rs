@@ -17,6 +17,7 @@ use super::product::ProductKind;
 use super::report::ProductsReport;
 use super::scene::SurfaceOfRun;
 use crate::job_file::read_dsm_job;
+use job::error::JobError;
 use job::files::{self, FileError};
 use job::guarded;
 use job::output_folder::OutputFolder;
@@ -44,8 +45,12 @@ const SETTINGS: &str = "used_config.toml";
 /// Makes products of the folder of a run, and a report beside them.
 ///
 /// # Errors
-/// [`ProductsError`]: a folder that is no run, images that cannot be found, outputs that exist.
-pub fn run(config: &ProductsConfig, progress: &dyn Progress) -> Result<ProductsReport, ProductsError> {
+/// [`JobError`]: a folder that is no run, images that cannot be found, outputs that exist.
+pub fn run(config: &ProductsConfig, progress: &dyn Progress) -> Result<ProductsReport, JobError> {
+    Ok(steps(config, progress)?)
+}
+
+fn steps(config: &ProductsConfig, progress: &dyn Progress) -> Result<ProductsReport, ProductsError> {
     config.validate()?;
     let output = config.folder();
     let names = config.products.iter().flat_map(|product| match product {

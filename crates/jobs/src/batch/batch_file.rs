@@ -8,6 +8,7 @@ use toml::Table;
 use crate::batch::error::BatchError;
 use crate::batch::task::{TaskKind, TaskSettings};
 use dsm::{LayerArea, MapBounds};
+use job::error::JobError;
 use job::files::read_text;
 use job::job_file;
 use job::job_paths::resolved;
@@ -132,12 +133,12 @@ impl BatchConfig {
     /// Works on the scenes of these names alone; the others are reported as they stand.
     ///
     /// # Errors
-    /// [`BatchError::UnknownScene`].
-    pub fn select(&mut self, names: &[String]) -> Result<(), BatchError> {
+    /// [`JobError`] for a scene that the batch does not have.
+    pub fn select(&mut self, names: &[String]) -> Result<(), JobError> {
         let is_known = |name: &String| self.scenes.iter().any(|scene| scene.name == *name);
         if let Some(name) = names.iter().find(|name| !is_known(name)) {
             let known = self.scenes.iter().map(|scene| scene.name.as_str()).collect::<Vec<_>>().join(", ");
-            return Err(BatchError::UnknownScene { name: name.clone(), known });
+            return Err(BatchError::UnknownScene { name: name.clone(), known }.into());
         }
         self.only = names.to_vec();
         Ok(())
@@ -215,11 +216,13 @@ impl BatchConfig {
 /// Reads a batch file.
 ///
 /// # Errors
-/// [`BatchError::Job`] also for unknown keys; [`BatchError::NoScene`], [`BatchError::NoOutput`],
-/// [`BatchError::SceneName`], [`BatchError::SameName`], [`BatchError::TwoAreas`],
-/// [`BatchError::Limit`]. Tasks and their
-/// settings are checked when the batch begins.
-pub fn read_batch(path: &Path) -> Result<BatchConfig, BatchError> {
+/// [`JobError`]: unknown keys, no scene or output folder, names that cannot be those of folders or
+/// are given twice. Tasks and their settings are checked when the batch begins.
+pub fn read_batch(path: &Path) -> Result<BatchConfig, JobError> {
+    Ok(parsed(path)?)
+}
+
+fn parsed(path: &Path) -> Result<BatchConfig, BatchError> {
     let text = read_text(path).map_err(job_file::JobFileError::from)?;
     let mut batch: BatchConfig = job_file::parse(&text, path)?;
     batch.validate(path)?;

@@ -2,20 +2,17 @@
 
 use std::path::PathBuf;
 
+use job::error::{JobError, from_steps, job_errors};
 use job::files::FileError;
 use job::job_file::JobFileError;
-use numeric::failures;
+use numeric::{Cancelled, failures};
 
 /// The reason why a batch did not start, or stopped. A task that fails is no error.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum BatchError {
+pub(crate) enum BatchError {
     /// The batch file cannot be read.
     #[error(transparent)]
-    Job(#[from] JobFileError),
-    /// The output folder or a report cannot be written.
-    #[error(transparent)]
-    File(#[from] FileError),
+    JobFile(#[from] JobFileError),
     /// The file names no scene.
     #[error("the batch has no scene; give at least one [[scene]] with a name and images: {}", path.display())]
     NoScene {
@@ -80,13 +77,16 @@ pub enum BatchError {
         /// The limit.
         name: &'static str,
     },
-    /// The caller asked the batch to stop.
+    /// The output folder or a report cannot be written, or the batch was cancelled.
     #[error(transparent)]
-    Cancelled(#[from] numeric::Cancelled),
+    Job(#[from] JobError),
 }
 
 failures!(BatchError: Input {
+    Self::JobFile(error) => error.kind(),
     Self::Job(error) => error.kind(),
-    Self::File(error) => error.kind(),
-    Self::Cancelled(error) => error.kind(),
 });
+
+job_errors!(BatchError);
+
+from_steps!(BatchError: Job(FileError, Cancelled));

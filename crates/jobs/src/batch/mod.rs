@@ -16,7 +16,6 @@ mod tasks_of_scene;
 
 pub use batch_file::{BatchConfig, BatchDefaults, BatchLimits, BatchScene, read_batch};
 pub use batch_report::{BatchReport, SceneReport, TaskReport, TaskState};
-pub use error::BatchError;
 pub use run::{look, run};
 pub use task::{TaskKind, TaskSettings};
 

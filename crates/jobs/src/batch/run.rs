@@ -12,6 +12,7 @@ use crate::batch::error::BatchError;
 use crate::batch::task::{TaskJob, TaskKind, TaskScene};
 use crate::batch::tasks_of_scene::{SceneJobs, TASKS, TaskLimits};
 use dsm::production::{CHUNKS, is_chunk, is_left_over};
+use job::error::JobError;
 use job::files::{FileError, write_json};
 use job::guarded::{self, TEMPORARY};
 use job::image_files::images_of;
@@ -43,10 +44,13 @@ const SCENE_FOLDERS: [&str; 13] = [
 /// Runs a batch. What an earlier run of it completed is left alone.
 ///
 /// # Errors
-/// [`BatchError::UnknownTask`], [`BatchError::Settings`] before anything is done;
-/// [`BatchError::File`] for a folder in use and a report that cannot be written;
-/// [`BatchError::Cancelled`]. A task that fails is in the report.
-pub fn run(batch: &BatchConfig, progress: &dyn Progress) -> Result<BatchReport, BatchError> {
+/// [`JobError`]: tasks and settings that are not known, before anything is done; a folder in use, a
+/// report that cannot be written, and when cancelled. A task that fails is in the report.
+pub fn run(batch: &BatchConfig, progress: &dyn Progress) -> Result<BatchReport, JobError> {
+    Ok(steps(batch, progress)?)
+}
+
+fn steps(batch: &BatchConfig, progress: &dyn Progress) -> Result<BatchReport, BatchError> {
     let all = prepare_all(batch)?;
     let folder = OutputFolder::take(&batch.output)?;
     guarded::remove_inside(folder.path(), &|name| name.starts_with(TEMPORARY))?;
@@ -94,8 +98,8 @@ pub fn run(batch: &BatchConfig, progress: &dyn Progress) -> Result<BatchReport, 
 /// looked at, and what is done already.
 ///
 /// # Errors
-/// [`BatchError::UnknownTask`], [`BatchError::Settings`].
-pub fn look(batch: &BatchConfig) -> Result<BatchReport, BatchError> {
+/// [`JobError`] for tasks and settings that are not known.
+pub fn look(batch: &BatchConfig) -> Result<BatchReport, JobError> {
     let scenes = prepare_all(batch)?;
     Ok(BatchReport::new(scenes.iter().map(|(is_selected, scene)| scene.look(!is_selected)).collect()))
 }
