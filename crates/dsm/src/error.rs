@@ -9,10 +9,8 @@ use sweep::SweepError;
 
 use crate::products::ProductsError;
 use crate::values::{HeightRange, MapBounds};
-use job::corrections::CorrectionsError;
 use job::error::{JobError, from_steps};
 use job::files::FileError;
-use job::threads::ThreadsError;
 
 /// A setting of [`DsmConfig`](crate::DsmConfig) that an error names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -143,7 +141,7 @@ pub enum DsmError {
     Control(#[from] io::ground_points::GroundPointsError),
     /// The pointing corrections to start from cannot be read.
     #[error(transparent)]
-    Corrections(#[from] CorrectionsError),
+    Corrections(JobError),
     /// An image cannot be read, or a raster cannot be written.
     #[error("cannot read the image")]
     Image(#[from] io::raster::RasterError),
@@ -375,7 +373,7 @@ pub enum DsmError {
     Sweep(#[from] SweepError),
     /// The worker threads cannot be started.
     #[error(transparent)]
-    Threads(#[from] ThreadsError),
+    Threads(JobError),
     /// The caller asked the run to stop.
     #[error("the run was cancelled")]
     Cancelled,

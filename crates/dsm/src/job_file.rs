@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use job::job_file::{JobFileError, read_job};
+use job::error::JobError;
+use job::job_file::read_job;
 
 use crate::DsmConfig;
 
@@ -14,8 +15,8 @@ pub const DSM_TEMPLATE: &str = include_str!("job_file/dsm.toml");
 /// The output folder may be left out; the caller then gives it.
 ///
 /// # Errors
-/// [`JobFileError`].
-pub fn read_dsm_job(path: &Path) -> Result<DsmConfig, JobFileError> {
+/// [`JobError`]: a file that cannot be read, or is no job file of a surface model.
+pub fn read_dsm_job(path: &Path) -> Result<DsmConfig, JobError> {
     read_job(path, |config: &mut DsmConfig, new_path| config.map_paths(new_path))
 }
 
@@ -23,7 +24,7 @@ pub fn read_dsm_job(path: &Path) -> Result<DsmConfig, JobFileError> {
 mod tests {
     use super::*;
 
-    fn job(text: &str) -> Result<DsmConfig, JobFileError> {
+    fn job(text: &str) -> Result<DsmConfig, JobError> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("job.toml");
         std::fs::write(&path, text).unwrap();
@@ -95,9 +96,12 @@ mod tests {
     /// The template has every key of the configuration, and the values that hold without it.
     #[test]
     fn the_template_has_every_key() {
-        let JobFileError::UnknownKey { known, .. } = job("no_such_key = 1").unwrap_err() else { panic!("no list") };
+        let text = job("no_such_key = 1").unwrap_err().to_string();
+        let (_, known) = text.split_once("known are ").expect("the known keys are listed");
+        let (known, _) = known.split_once(": ").expect("the path follows");
+        let known: Vec<&str> = known.split(", ").collect();
         let is_key = |line: &&str| {
-            line.trim_start_matches('#').trim().split_once(" = ").is_some_and(|(key, _)| known.iter().any(|k| k == key))
+            line.trim_start_matches('#').trim().split_once(" = ").is_some_and(|(key, _)| known.contains(&key))
         };
         let keys: Vec<&str> = DSM_TEMPLATE.lines().filter(is_key).collect();
         assert_eq!(keys.len(), known.len(), "{keys:?} {known:?}");

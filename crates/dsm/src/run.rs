@@ -56,7 +56,8 @@ pub fn run(config: &DsmConfig, progress: &dyn Progress) -> Result<DsmReport, Dsm
         let report = sweep_and_merge(&plan, folder, &inputs, &mut session)?.report;
         products::beside(&config.output, &config.products, config.overwrite, progress)?;
         Ok(report)
-    })?
+    })
+    .map_err(DsmError::Threads)?
 }
 
 /// Computes all chunks of a plan and merges them.

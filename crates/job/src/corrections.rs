@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use numeric::{Kind, Progress, failures};
 
+use crate::error::{JobError, from_failures};
 use crate::files::{self, FileError};
 use crate::same_view::carried;
 
@@ -31,8 +32,7 @@ const RUN_DEPTH: usize = 2;
 
 /// A report whose corrections cannot be read.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum CorrectionsError {
+pub(crate) enum CorrectionsError {
     /// The report cannot be read.
     #[error("cannot read the report with the pointing corrections ({source}): {}", path.display())]
     Unreadable {
@@ -69,6 +69,8 @@ pub enum CorrectionsError {
 
 failures!(CorrectionsError: File { Self::NotInRun { .. } => Kind::Input });
 
+from_failures!(CorrectionsError);
+
 /// Finds an image among those that a DSM run used: where it lies, and the pointing correction that
 /// the run found for it (the identity where it found none).
 ///
@@ -76,8 +78,8 @@ failures!(CorrectionsError: File { Self::NotInRun { .. } => Kind::Input });
 /// path that is given is preferred to that of the run, which may have moved.
 ///
 /// # Errors
-/// [`CorrectionsError`] if the folder holds no report, or the run did not use the image.
-pub fn image_of_run(run: &Path, image: &Path) -> Result<(PathBuf, ImageCorrection), CorrectionsError> {
+/// [`JobError`] if the folder holds no report, or the run did not use the image.
+pub fn image_of_run(run: &Path, image: &Path) -> Result<(PathBuf, ImageCorrection), JobError> {
     let report = report_of_run(run).filter(|_| run.is_dir());
     let report = RunReport::read(&report.ok_or_else(|| CorrectionsError::NoRun { path: run.to_owned() })?)?;
     let whole = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned());
@@ -125,8 +127,8 @@ impl Corrections {
     /// Reads the corrections of a report.
     ///
     /// # Errors
-    /// [`CorrectionsError`] if the file cannot be read or is not the report of a DSM run.
-    pub fn read(path: &Path) -> Result<Self, CorrectionsError> {
+    /// [`JobError`] if the file cannot be read or is not the report of a DSM run.
+    pub fn read(path: &Path) -> Result<Self, JobError> {
         let report = RunReport::read(path)?;
         let images = report.images.into_iter().filter_map(|image| Some((image.path, image.applied_correction?)));
         Ok(Self { images: images.collect() })
@@ -137,7 +139,7 @@ impl Corrections {
     ///
     /// # Errors
     /// As [`Self::read`].
-    pub fn for_surface(surface: &Path, source: &CorrectionSource) -> Result<Self, CorrectionsError> {
+    pub fn for_surface(surface: &Path, source: &CorrectionSource) -> Result<Self, JobError> {
         match source {
             CorrectionSource::Uncorrected => Ok(Self::default()),
             CorrectionSource::Report(path) => Self::read(path),
@@ -156,7 +158,7 @@ impl Corrections {
     ///
     /// # Errors
     /// As [`Self::read`].
-    pub fn of_run_around(file: &Path) -> Result<Self, CorrectionsError> {
+    pub fn of_run_around(file: &Path) -> Result<Self, JobError> {
         let file = file.canonicalize().unwrap_or_else(|_| file.to_owned());
         let report = file.ancestors().skip(1).take(RUN_DEPTH).find_map(report_of_run);
         report.map_or_else(|| Ok(Self::default()), |path| Self::read(&path))
@@ -166,7 +168,7 @@ impl Corrections {
     ///
     /// # Errors
     /// As [`Self::read`].
-    pub fn images_of_run(surface: &Path) -> Result<Vec<PathBuf>, CorrectionsError> {
+    pub fn images_of_run(surface: &Path) -> Result<Vec<PathBuf>, JobError> {
         let report = report_of_run(surface).map(|path| RunReport::read(&path)).transpose()?;
         Ok(report.map_or_else(Vec::new, |report| report.images.into_iter().map(|image| image.path).collect()))
     }

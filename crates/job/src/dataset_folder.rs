@@ -6,31 +6,25 @@ use io::splat_ply::LocalOrigin;
 use numeric::failures;
 use serde_json::Value;
 
-use crate::files::{self, FileError};
+use crate::error::{JobError, from_failures};
+use crate::files;
 
 /// Reference system of a dataset that does not name one.
 pub const UNKNOWN_FRAME: &str = "frame of the dataset";
 /// Vertical datum of a dataset, which its origin does not name.
 pub const UNKNOWN_DATUM: &str = "unknown";
 
-/// The origin of a dataset that cannot be used.
+/// The origin of a dataset that is not JSON.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum DatasetOriginError {
-    /// The file cannot be read.
-    #[error(transparent)]
-    File(#[from] FileError),
-    /// The file is not JSON.
-    #[error("the file is not an origin as skysweep writes it ({source}): {}", path.display())]
-    NotJson {
-        /// The file.
-        path: PathBuf,
-        /// What the JSON reader found.
-        source: serde_json::Error,
-    },
+#[error("the file is not an origin as skysweep writes it ({source}): {}", path.display())]
+pub(crate) struct DatasetOriginError {
+    path: PathBuf,
+    source: serde_json::Error,
 }
 
-failures!(DatasetOriginError: File { Self::File(error) => error.kind() });
+failures!(DatasetOriginError: File);
+
+from_failures!(DatasetOriginError);
 
 /// Folders below a dataset in which its model and its images are looked for, in depth.
 const DEPTH: usize = 4;
@@ -98,14 +92,17 @@ pub fn dataset_folder(sparse: &Path) -> PathBuf {
 }
 
 /// Returns where the positions of a dataset are counted from, as far as its origin says so.
-pub fn dataset_origin(dataset: &Path) -> Result<LocalOrigin, DatasetOriginError> {
+///
+/// # Errors
+/// [`JobError`] if the file of the origin cannot be read, or is not JSON.
+pub fn dataset_origin(dataset: &Path) -> Result<LocalOrigin, JobError> {
     let path = dataset.join("origin.json");
     let unknown = LocalOrigin::new(UNKNOWN_FRAME, UNKNOWN_DATUM, [0.0; 3]);
     if !path.is_file() {
         return Ok(unknown);
     }
     let value: Value = serde_json::from_str(&files::read_text(&path)?)
-        .map_err(|source| DatasetOriginError::NotJson { path: path.clone(), source })?;
+        .map_err(|source| DatasetOriginError { path: path.clone(), source })?;
     let part = &value["model_from_dataset"];
     let identity = serde_json::json!([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
     let shift: Option<[f64; 3]> = serde_json::from_value(part["translation"].clone()).ok();

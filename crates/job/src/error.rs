@@ -5,13 +5,12 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 use crs::{CrsError, MapProjection};
+use io::colmap::ColmapError;
 use io::raster::RasterError;
 use io::rpc::RpcReadError;
 use numeric::{Cancelled, Failure, Kind, failures};
 
-use crate::corrections::CorrectionsError;
 use crate::files::FileError;
-use crate::threads::ThreadsError;
 
 /// Implements `From` of the errors of steps for the error of a job. The variant that holds them
 /// takes them through their own `From`: into [`JobError`], or into a box because they are several
@@ -119,7 +118,7 @@ impl From<SettingError> for JobError {
 /// Takes in the errors of steps that are alike in every job.
 macro_rules! from_failures {
     ($($error:ty),+ $(,)?) => {$(
-        impl From<$error> for JobError {
+        impl From<$error> for $crate::error::JobError {
             fn from(error: $error) -> Self {
                 Self::new(error)
             }
@@ -127,7 +126,9 @@ macro_rules! from_failures {
     )+};
 }
 
-from_failures!(FileError, ThreadsError, Cancelled, RasterError, CrsError);
+pub(crate) use from_failures;
+
+from_failures!(FileError, Cancelled, RasterError, RpcReadError, ColmapError, CrsError);
 
 /// A setting outside of its range.
 #[derive(Debug, thiserror::Error)]
@@ -150,29 +151,6 @@ impl SettingError {
         Self { name, found: found.to_string(), expected: expected.into() }
     }
 }
-
-/// A satellite image that cannot be read with its camera.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum ImageInputError {
-    /// The image cannot be read.
-    #[error(transparent)]
-    Raster(#[from] RasterError),
-    /// The image has no usable RPC.
-    #[error(transparent)]
-    Rpc(Box<RpcReadError>),
-    /// The pointing corrections cannot be read.
-    #[error(transparent)]
-    Corrections(#[from] CorrectionsError),
-}
-
-failures!(ImageInputError: File {
-    Self::Raster(error) => error.kind(),
-    Self::Rpc(error) => error.kind(),
-    Self::Corrections(error) => error.kind(),
-});
-
-from_steps!(ImageInputError: Rpc(RpcReadError));
 
 /// The coordinate reference system of a file cannot be used.
 #[derive(Debug, thiserror::Error)]

@@ -10,17 +10,14 @@ use std::path::{Path, PathBuf};
 use numeric::{failures, nearest_name};
 use serde::de::DeserializeOwned;
 
-use crate::files::{FileError, read_text};
+use crate::error::{JobError, from_failures};
+use crate::files::read_text;
 use crate::job_paths::resolved;
 use crate::path_variables::expanded;
 
 /// A job file that cannot be used.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum JobFileError {
-    /// The file cannot be read.
-    #[error(transparent)]
-    File(#[from] FileError),
+enum JobFileError {
     /// A key that the job does not have.
     #[error(
         "unknown key `{key}` (line {line}); {}: {}",
@@ -59,17 +56,20 @@ pub enum JobFileError {
     },
 }
 
-failures!(JobFileError: Input { Self::File(error) => error.kind() });
+failures!(JobFileError: Input);
+
+from_failures!(JobFileError);
 
 /// Reads a configuration from a job file. `map_paths` replaces each path of the configuration: by
 /// the path with its variables expanded, seen from the folder of the file.
 ///
 /// # Errors
-/// [`JobFileError`].
+/// [`JobError`] for a file that cannot be read, for those of [`parse`], and for a path with a
+/// variable that is not set.
 pub fn read_job<T: DeserializeOwned>(
     path: &Path,
     map_paths: impl FnOnce(&mut T, &dyn Fn(&Path) -> PathBuf),
-) -> Result<T, JobFileError> {
+) -> Result<T, JobError> {
     let mut config: T = parse(&read_text(path)?, path)?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let unset = RefCell::new(None);
@@ -81,9 +81,17 @@ pub fn read_job<T: DeserializeOwned>(
         }
     });
     match unset.into_inner() {
-        Some(what) => Err(JobFileError::Variable { path: path.to_owned(), what }),
+        Some(what) => Err(JobFileError::Variable { path: path.to_owned(), what }.into()),
         None => Ok(config),
     }
+}
+
+/// Returns a path of the job file at `file` with its variables expanded.
+///
+/// # Errors
+/// [`JobError`] for a variable that is not set.
+pub fn with_variables(named: &Path, file: &Path) -> Result<PathBuf, JobError> {
+    Ok(expanded(named).map_err(|what| JobFileError::Variable { path: file.to_owned(), what })?)
 }
 
 /// Whether a path has the ending of job files.
@@ -94,17 +102,30 @@ pub fn is_job_file(path: &Path) -> bool {
 /// Parses a configuration. `path` is the file for errors.
 ///
 /// # Errors
-/// [`JobFileError::UnknownKey`], [`JobFileError::Invalid`].
-pub fn parse<T: DeserializeOwned>(text: &str, path: &Path) -> Result<T, JobFileError> {
-    toml::from_str(text).map_err(|error| {
+/// [`JobError`] for a key that the job does not have, text that is not TOML, a value of the wrong
+/// type, and a missing key.
+pub fn parse<T: DeserializeOwned>(text: &str, path: &Path) -> Result<T, JobError> {
+    let parsed = toml::from_str(text).map_err(|error| {
         let start = error.span().map_or(0, |span| span.start.min(text.len()));
         let line = 1 + text.as_bytes()[..start].iter().filter(|byte| **byte == b'\n').count();
         defect(error.message(), line, path)
-    })
+    });
+    Ok(parsed?)
+}
+
+/// Returns a defect, which serde describes as `message`, in the words of job files.
+pub fn in_words(message: &str) -> String {
+    match defect(message, 0, Path::new("")) {
+        JobFileError::UnknownKey { key, nearest: Some(nearest), .. } => {
+            format!("unknown key `{key}`; did you mean `{nearest}`?")
+        }
+        JobFileError::UnknownKey { key, known, .. } => format!("unknown key `{key}`; known are {}", known.join(", ")),
+        JobFileError::Invalid { what, .. } | JobFileError::Variable { what, .. } => what,
+    }
 }
 
 /// Makes the error of a defect, which serde describes as `message`.
-pub fn defect(message: &str, line: usize, path: &Path) -> JobFileError {
+fn defect(message: &str, line: usize, path: &Path) -> JobFileError {
     let path = path.to_owned();
     let mut quoted = message.split('`').skip(1).step_by(2).map(str::to_owned);
     if message.starts_with("unknown field")

@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use crs::{CrsError, HeightConverter, MapProjection, VerticalDatum};
-use io::raster::{Dem, RasterError, read_dem};
-
+use io::raster::{Dem, read_dem};
 use numeric::{Progress, failures};
 
+use crate::error::{JobError, from_failures};
 use crate::run_folder::surface_file;
 
 /// A surface model that has been read.
@@ -19,11 +19,7 @@ pub struct MapSurface {
 
 /// A surface model that cannot be used.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum MapSurfaceError {
-    /// The raster cannot be read.
-    #[error(transparent)]
-    Raster(#[from] RasterError),
+pub(crate) enum MapSurfaceError {
     /// The raster names no coordinate reference system.
     #[error("the surface model has no coordinate reference system: {}", path.display())]
     NoCrs {
@@ -60,20 +56,21 @@ pub enum MapSurfaceError {
 }
 
 failures!(MapSurfaceError: Crs {
-    Self::Raster(error) => error.kind(),
     Self::Crs { source, .. } | Self::Heights { source, .. } => source.kind(),
 });
+
+from_failures!(MapSurfaceError);
 
 /// Reads a surface model, or that of the folder of a DSM run; `stated` overrides the vertical datum
 /// that the file names.
 ///
 /// # Errors
-/// [`MapSurfaceError`] if the raster cannot be read or does not lie on a projected map in metres.
+/// [`JobError`] if the raster cannot be read or does not lie on a projected map in metres.
 pub fn read(
     path: &Path,
     stated: Option<VerticalDatum>,
     progress: &dyn Progress,
-) -> Result<MapSurface, MapSurfaceError> {
+) -> Result<MapSurface, JobError> {
     let path = &surface_file(path);
     let mut dem = read_dem(path)?;
     let definition = dem.horizontal_epsg.map(|code| format!("EPSG:{code}")).or_else(|| dem.crs_wkt.clone());
@@ -84,7 +81,7 @@ pub fn read(
         Some(1.0) => {}
         unit => {
             let unit = unit.map_or("degrees".to_owned(), |metres| format!("units of {metres} m"));
-            return Err(MapSurfaceError::NotInMetres { path: path.to_owned(), unit });
+            return Err(MapSurfaceError::NotInMetres { path: path.to_owned(), unit }.into());
         }
     }
     match stated.or(dem.vertical) {

@@ -3,21 +3,16 @@
 
 use std::path::{Path, PathBuf};
 
-use io::colmap::{ColmapError, ColmapModel};
+use io::colmap::ColmapModel;
 use io::splat_ply::LocalOrigin;
 use numeric::{Kind, failures};
 
-use crate::dataset_folder::{
-    DatasetOriginError, UNKNOWN_DATUM, UNKNOWN_FRAME, dataset_folder, dataset_origin, sparse_folder,
-};
+use crate::dataset_folder::{UNKNOWN_DATUM, UNKNOWN_FRAME, dataset_folder, dataset_origin, sparse_folder};
+use crate::error::{JobError, from_failures};
 
 /// A COLMAP model that cannot be placed on the map.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum PlacedModelError {
-    /// The model cannot be read.
-    #[error(transparent)]
-    Colmap(#[from] ColmapError),
+pub(crate) enum PlacedModelError {
     /// There is no readable `origin.json`.
     #[error("the model has no origin on a map ({source}); align it to a map first: {}", path.display())]
     NoOrigin {
@@ -34,9 +29,6 @@ pub enum PlacedModelError {
         /// What the JSON reader found.
         source: serde_json::Error,
     },
-    /// The dataset around the model cannot be read.
-    #[error(transparent)]
-    Dataset(#[from] DatasetOriginError),
     /// The cameras and the surface are on different maps.
     #[error(
         "the cameras are in {} above the {}, the surface is in {} above the {}; align the cameras to the surface's map",
@@ -50,18 +42,16 @@ pub enum PlacedModelError {
     },
 }
 
-failures!(PlacedModelError: File {
-    Self::Colmap(error) => error.kind(),
-    Self::Dataset(error) => error.kind(),
-    Self::OtherMap { .. } => Kind::Other,
-});
+failures!(PlacedModelError: File { Self::OtherMap { .. } => Kind::Other });
+
+from_failures!(PlacedModelError);
 
 /// Reads the cameras of a model, or of a dataset with a model in `sparse/0`, and shifts them so
 /// that their positions are relative to `origin`.
 ///
 /// # Errors
-/// [`PlacedModelError`] if the model or its origin cannot be read, or if it lies on another map.
-pub fn read(folder: &Path, origin: &LocalOrigin) -> Result<ColmapModel, PlacedModelError> {
+/// [`JobError`] if the model or its origin cannot be read, or if it lies on another map.
+pub fn read(folder: &Path, origin: &LocalOrigin) -> Result<ColmapModel, JobError> {
     let sparse = sparse_folder(folder);
     let mut model = io::colmap::read(&sparse)?;
     let path = sparse.join("origin.json");
@@ -76,7 +66,8 @@ pub fn read(folder: &Path, origin: &LocalOrigin) -> Result<ColmapModel, PlacedMo
     };
     let same_datum = own.vertical == origin.vertical || [&own, origin].iter().any(|o| o.vertical == UNKNOWN_DATUM);
     if own.crs != origin.crs || !same_datum {
-        return Err(PlacedModelError::OtherMap { cameras: Box::new(own), surface: Box::new(origin.clone()) });
+        let (cameras, surface) = (Box::new(own), Box::new(origin.clone()));
+        return Err(PlacedModelError::OtherMap { cameras, surface }.into());
     }
     let shift = [0, 1, 2].map(|i| own.origin[i] - origin.origin[i]);
     for view in &mut model.views {

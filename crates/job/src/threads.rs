@@ -2,48 +2,38 @@
 
 use numeric::failures;
 
+use crate::error::{JobError, SettingError, from_failures};
+
 /// Most worker threads. Each takes memory for its stack.
 const THREADS_MAX: usize = 1024;
 
 /// Worker threads that cannot be started.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum ThreadsError {
-    /// No thread was asked for.
-    #[error("the number of worker threads is 0, expected 1 or more")]
-    Zero,
-    /// More threads were asked for than any machine has use for.
-    #[error("the number of worker threads is {threads}, expected at most {}", THREADS_MAX)]
-    TooMany {
-        /// How many were asked for.
-        threads: usize,
-    },
-    /// The pool could not be made.
-    #[error("cannot start {threads} worker threads: {reason}")]
-    Start {
-        /// How many were asked for.
-        threads: usize,
-        /// The reason that the pool gave.
-        reason: String,
-    },
+#[error("cannot start {threads} worker threads: {reason}")]
+pub(crate) struct ThreadsError {
+    threads: usize,
+    reason: String,
 }
 
 failures!(ThreadsError: Input);
 
+from_failures!(ThreadsError);
+
 /// Runs `work` on a pool of `threads` workers, or on the caller's pool if no number is given.
 ///
 /// # Errors
-/// [`ThreadsError`] if the pool cannot be started.
-pub fn install<T: Send>(threads: Option<usize>, work: impl FnOnce() -> T + Send) -> Result<T, ThreadsError> {
+/// [`JobError`] for a number of threads that is 0 or above 1024, and if the pool cannot be started.
+pub fn install<T: Send>(threads: Option<usize>, work: impl FnOnce() -> T + Send) -> Result<T, JobError> {
     let Some(threads) = threads else { return Ok(work()) };
+    let unusable = |expected: String| SettingError::new("the number of worker threads", threads, expected);
     if threads == 0 {
-        return Err(ThreadsError::Zero);
+        return Err(unusable("1 or more".to_owned()).into());
     }
     if threads > THREADS_MAX {
-        return Err(ThreadsError::TooMany { threads });
+        return Err(unusable(format!("at most {THREADS_MAX}")).into());
     }
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-    let pool = pool.map_err(|e| ThreadsError::Start { threads, reason: e.to_string() })?;
+    let pool = pool.map_err(|e| ThreadsError { threads, reason: e.to_string() })?;
     Ok(pool.install(work))
 }
 
@@ -56,12 +46,17 @@ pub fn count(threads: Option<usize>) -> usize {
 
 #[cfg(test)]
 mod tests {
+    use numeric::{Failure, Kind};
+
     use super::*;
 
     #[test]
     fn absurd_numbers_of_threads_are_refused() {
-        assert!(matches!(install(Some(0), || ()), Err(ThreadsError::Zero)));
-        assert!(matches!(install(Some(100_000), || ()), Err(ThreadsError::TooMany { threads: 100_000 })));
+        for (threads, expected) in [(0, "is 0, expected 1 or more"), (100_000, "is 100000, expected at most 1024")] {
+            let refused = install(Some(threads), || ()).unwrap_err();
+            assert_eq!(refused.to_string(), format!("the number of worker threads {expected}"));
+            assert_eq!((refused.kind(), refused.setting()), (Kind::Input, Some("the number of worker threads")));
+        }
         assert_eq!(count(Some(100_000)), THREADS_MAX);
     }
 }

@@ -33,8 +33,8 @@ use job::error::{JobError, SettingError, from_steps, job_errors};
 use job::files::{self, FileError};
 use job::guarded;
 use job::output_folder::OutputFolder;
-use job::placed_model::{self, PlacedModelError};
-use job::threads::{ThreadsError, install};
+use job::placed_model;
+use job::threads::install;
 
 /// The record, which is written last.
 const RECORD: &str = "scene.json";
@@ -116,9 +116,6 @@ pub(crate) enum SimulateJobError {
         /// The folder.
         path: PathBuf,
     },
-    /// The given cameras cannot be read or are on another map.
-    #[error(transparent)]
-    Cameras(#[from] PlacedModelError),
     /// A perspective camera cannot be made.
     #[error(transparent)]
     Flight(#[from] LensError),
@@ -136,7 +133,6 @@ pub(crate) enum SimulateJobError {
 failures!(SimulateJobError: Other {
     Self::Scene(_) | Self::Parameters { .. } => Kind::Input,
     Self::NotEmpty { .. } => Kind::OutputExists,
-    Self::Cameras(error) => error.kind(),
     Self::Job(error) => error.kind(),
 });
 
@@ -144,7 +140,7 @@ job_errors!(SimulateJobError {
     Self::NotEmpty { .. } => Some("the output folder"),
 });
 
-from_steps!(SimulateJobError: Job(FileError, ThreadsError, SettingError, Cancelled));
+from_steps!(SimulateJobError: Job(FileError, SettingError, Cancelled));
 
 impl SimulateReport {
     /// Returns the report as text, which ends in a line break.

@@ -19,7 +19,7 @@ use super::rasters;
 use job::dataset_folder::{UNKNOWN_FRAME, sparse_folder};
 use job::error::JobError;
 use job::error_text::with_causes;
-use job::placed_model::{self, PlacedModelError};
+use job::placed_model;
 
 /// Most splats: 256 MB to send without harmonics. A browser sorts them in about a second.
 const SPLATS_MAX: usize = 8_000_000;
@@ -248,7 +248,7 @@ impl Space {
         Some([0, 1, 2].map(|i| origin.origin[i] - self.origin[i]))
     }
 
-    fn add_cameras(&mut self, folder: &Path, held_out: &[String]) -> Result<(), PlacedModelError> {
+    fn add_cameras(&mut self, folder: &Path, held_out: &[String]) -> Result<(), JobError> {
         let sparse = sparse_folder(folder);
         if self.is_empty() || !["bin", "txt"].iter().any(|kind| sparse.join(format!("cameras.{kind}")).is_file()) {
             return Ok(());

@@ -82,7 +82,7 @@ pub fn point(config: &DsmConfig, opened: &Opened, session: &mut Session<'_>) -> 
     let mut images = opened.images.clone();
     let config = &in_order_of(config, &images);
     if let Some(path) = &config.corrections {
-        let earlier = Corrections::read(path)?;
+        let earlier = Corrections::read(path).map_err(DsmError::Corrections)?;
         for image in &mut images {
             image.camera.correction = earlier.for_image(&image.path, session.progress);
         }

@@ -5,8 +5,6 @@ use std::path::PathBuf;
 use crate::DsmError;
 use job::error::{JobError, job_errors};
 use job::files::FileError;
-use job::job_file::JobFileError;
-use job::threads::ThreadsError;
 use numeric::{Kind, failures};
 
 /// The reason why a planned run ended without a result.
@@ -18,15 +16,10 @@ pub(crate) enum ProductionError {
     /// A file of the run folder cannot be read or written.
     #[error(transparent)]
     File(#[from] FileError),
-    /// The configuration in the run folder cannot be read.
-    #[error(transparent)]
-    JobFile(#[from] JobFileError),
-    /// A step that is a job of its own ended without a result.
+    /// The configuration in the run folder cannot be read, the worker threads cannot be started, or
+    /// a step that is a job of its own ended without a result.
     #[error(transparent)]
     Job(#[from] JobError),
-    /// The worker threads cannot be started.
-    #[error(transparent)]
-    Threads(#[from] ThreadsError),
     /// The folder has no plan.
     #[error("the folder has no plan; plan the run first: {}", path.display())]
     NoPlan {
@@ -114,9 +107,7 @@ pub(crate) enum ProductionError {
 failures!(ProductionError: Other {
     Self::Dsm(error) => error.kind(),
     Self::File(error) => error.kind(),
-    Self::JobFile(error) => error.kind(),
     Self::Job(error) => error.kind(),
-    Self::Threads(error) => error.kind(),
     Self::OtherPlan { .. } => Kind::Input,
     Self::NoPlan { .. } | Self::Plan { .. } => Kind::File,
 });

@@ -119,7 +119,7 @@ impl PlanFile {
     /// one that it was made from.
     ///
     /// # Errors
-    /// As [`Self::read`]; [`ProductionError::JobFile`], [`ProductionError::ConfigChanged`].
+    /// As [`Self::read`]; [`ProductionError::Job`], [`ProductionError::ConfigChanged`].
     pub(super) fn read_current(folder: &Path) -> Result<Arc<Self>, ProductionError> {
         let file = Self::stored_in(folder)?;
         let path = folder.join(USED_CONFIG);

@@ -113,7 +113,7 @@ fn write(folder: &OutputFolder, config: &DsmConfig, file: &PlanFile) -> Result<(
 /// Does nothing when another process was faster, and the plan fits.
 ///
 /// # Errors
-/// As [`plan_run`]; [`ProductionError::JobFile`].
+/// As [`plan_run`]; [`ProductionError::Job`].
 pub(super) fn plan_again(
     folder: &Path,
     threads: Option<usize>,

@@ -8,8 +8,6 @@ use numeric::{Cancelled, Failure, Kind, failures};
 
 use job::error::{JobError, SettingError, from_steps, job_errors};
 use job::files::FileError;
-use job::job_file::JobFileError;
-use job::threads::ThreadsError;
 
 /// Products that cannot be made.
 #[derive(Debug, thiserror::Error)]
@@ -67,7 +65,7 @@ pub(crate) enum ProductsError {
     },
     /// The images of the run cannot be found.
     #[error("cannot find the images of the run for an ortho; give an ortho, or the settings of the run")]
-    Images(#[source] Box<JobFileError>),
+    Images(#[source] Box<JobError>),
     /// The ortho cannot be made.
     #[error("cannot make the ortho that colours the products; an ortho can be given instead")]
     Ortho(#[source] Box<JobError>),
@@ -99,7 +97,7 @@ job_errors!(ProductsError {
     Self::Images(_) | Self::Ortho(_) | Self::OrthoElsewhere { .. } => Some("the ortho"),
 });
 
-from_steps!(ProductsError: Job(SettingError, FileError, ThreadsError, Cancelled));
+from_steps!(ProductsError: Job(SettingError, FileError, Cancelled));
 
 impl ProductsError {
     /// Takes the error of the job that makes a product. A job that was cancelled is wrapped in

@@ -12,7 +12,6 @@ use job::error::JobError;
 use job::files::read_text;
 use job::job_file;
 use job::job_paths::resolved;
-use job::path_variables::expanded;
 
 /// A batch: scenes and what is to be made of them.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -223,12 +222,10 @@ pub fn read_batch(path: &Path) -> Result<BatchConfig, JobError> {
 }
 
 fn parsed(path: &Path) -> Result<BatchConfig, BatchError> {
-    let text = read_text(path).map_err(job_file::JobFileError::from)?;
-    let mut batch: BatchConfig = job_file::parse(&text, path)?;
+    let mut batch: BatchConfig = job_file::parse(&read_text(path)?, path)?;
     batch.validate(path)?;
     path.parent().unwrap_or(Path::new("")).clone_into(&mut batch.folder);
-    let with_variables =
-        |named: &Path| expanded(named).map_err(|what| job_file::JobFileError::Variable { path: path.to_owned(), what });
+    let with_variables = |named: &Path| job_file::with_variables(named, path);
     batch.output = resolved(&with_variables(&batch.output)?, &batch.folder);
     for scene in &mut batch.scenes {
         for image in &mut scene.images {

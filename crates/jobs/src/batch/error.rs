@@ -4,15 +4,11 @@ use std::path::PathBuf;
 
 use job::error::{JobError, from_steps, job_errors};
 use job::files::FileError;
-use job::job_file::JobFileError;
 use numeric::{Cancelled, failures};
 
 /// The reason why a batch did not start, or stopped. A task that fails is no error.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum BatchError {
-    /// The batch file cannot be read.
-    #[error(transparent)]
-    JobFile(#[from] JobFileError),
     /// The file names no scene.
     #[error("the batch has no scene; give at least one [[scene]] with a name and images: {}", path.display())]
     NoScene {
@@ -77,15 +73,13 @@ pub(crate) enum BatchError {
         /// The limit.
         name: &'static str,
     },
-    /// The output folder or a report cannot be written, or the batch was cancelled.
+    /// The batch file cannot be read, the output folder or a report cannot be written, or the batch
+    /// was cancelled.
     #[error(transparent)]
     Job(#[from] JobError),
 }
 
-failures!(BatchError: Input {
-    Self::JobFile(error) => error.kind(),
-    Self::Job(error) => error.kind(),
-});
+failures!(BatchError: Input { Self::Job(error) => error.kind() });
 
 job_errors!(BatchError);
 

@@ -12,7 +12,7 @@ use dsm::production::{PLAN, POINTING, make_or_resume};
 use dsm::products::ProductsConfig;
 use dsm::{DsmConfig, FILES, LayerArea, MapBounds, USED_CONFIG};
 use job::error_text::with_causes;
-use job::job_file::{JobFileError, defect};
+use job::job_file::in_words;
 use job::job_paths::resolved;
 use job::path_variables::expanded;
 use scenes::priors::PriorsConfig;
@@ -413,18 +413,6 @@ fn with<T: Serialize + DeserializeOwned>(base: &T, given: &Table) -> Result<T, S
     let mut all = Table::try_from(base).map_err(|e| e.to_string())?;
     lay_over(&mut all, given);
     T::deserialize(all).map_err(|error| in_words(error.message()))
-}
-
-/// Returns the text of serde in the words of job files.
-fn in_words(message: &str) -> String {
-    match defect(message, 0, Path::new("")) {
-        JobFileError::UnknownKey { key, nearest: Some(nearest), .. } => {
-            format!("unknown key `{key}`; did you mean `{nearest}`?")
-        }
-        JobFileError::UnknownKey { key, known, .. } => format!("unknown key `{key}`; known are {}", known.join(", ")),
-        JobFileError::Invalid { what, .. } => what,
-        other => other.to_string(),
-    }
 }
 
 /// Replaces the values of a table by those of another, key by key.

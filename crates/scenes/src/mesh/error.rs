@@ -12,7 +12,6 @@ use tsdf::FusionError;
 use crate::train::TrainError;
 use job::error::{JobError, SettingError, from_steps, job_errors};
 use job::files::FileError;
-use job::threads::ThreadsError;
 
 /// A mesh that is not made.
 #[derive(Debug, thiserror::Error)]
@@ -103,4 +102,4 @@ impl From<TrainError> for MeshJobError {
     }
 }
 
-from_steps!(MeshJobError: Job(FileError, ThreadsError, SettingError, Cancelled));
+from_steps!(MeshJobError: Job(FileError, SettingError, Cancelled));

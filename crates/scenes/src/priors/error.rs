@@ -16,10 +16,8 @@ use io::similarity::SimilarityFileError;
 use numeric::{Cancelled, Kind, failures};
 use report::PictureError;
 
-use job::corrections::CorrectionsError;
-use job::error::{ImageInputError, JobError, from_steps, job_errors};
+use job::error::{JobError, from_steps, job_errors};
 use job::files::FileError;
-use job::threads::ThreadsError;
 
 /// Priors that could not be made.
 #[derive(Debug, thiserror::Error)]
@@ -240,9 +238,6 @@ pub(crate) enum PriorsJobError {
     /// The similarity cannot be read.
     #[error(transparent)]
     Transform(#[from] SimilarityFileError),
-    /// A satellite image cannot be read with its camera.
-    #[error(transparent)]
-    Image(#[from] ImageInputError),
     /// The pointing correction cannot be folded into the RPC.
     #[error(transparent)]
     Fold(#[from] FitError),
@@ -268,7 +263,6 @@ failures!(PriorsJobError: Other {
     Self::Colmap(error) => error.kind(),
     Self::Transforms(error) => error.kind(),
     Self::Transform(error) => error.kind(),
-    Self::Image(error) => error.kind(),
     Self::Crs(error) => error.kind(),
     Self::Npy(error) => error.kind(),
     Self::Job(error) => error.kind(),
@@ -286,7 +280,7 @@ job_errors!(PriorsJobError {
     Self::Lens { source: LensFault::OffMiddle { .. }, .. } => Some("the principal point"),
 });
 
-from_steps!(PriorsJobError: Job(FileError, ThreadsError, Cancelled), Image(RasterError, RpcReadError, CorrectionsError));
+from_steps!(PriorsJobError: Job(FileError, Cancelled, RasterError, RpcReadError));
 
 /// What a trainer cannot do with a lens.
 #[derive(Debug, thiserror::Error)]

@@ -7,8 +7,7 @@ use io::raster::RasterError;
 use io::rpc::{RpcReadError, RpcWriteError};
 use numeric::{Kind, failures};
 
-use job::corrections::CorrectionsError;
-use job::error::{ImageInputError, JobError, SettingError, from_steps, job_errors};
+use job::error::{JobError, SettingError, from_steps, job_errors};
 use job::files::FileError;
 use job::image_files::ImageFilesError;
 
@@ -30,9 +29,6 @@ pub(crate) enum RpcJobError {
         /// The output file.
         path: PathBuf,
     },
-    /// The corrections cannot be read.
-    #[error(transparent)]
-    Corrections(#[from] CorrectionsError),
     /// The report has no correction of the image.
     #[error("the report has no pointing correction of {}: {}", path.display(), report.display())]
     NotCorrected {
@@ -118,9 +114,6 @@ pub(crate) enum RpcJobError {
         /// The folder.
         path: PathBuf,
     },
-    /// A camera of an image cannot be made.
-    #[error(transparent)]
-    Camera(#[from] ImageInputError),
     /// A text of the dataset cannot be written.
     #[error(transparent)]
     Text(#[from] io::atomic::SaveError),
@@ -138,10 +131,8 @@ failures!(RpcJobError: Other {
     Self::Line { source, .. } => source.kind(),
     Self::Read(error) => error.kind(),
     Self::Write(error) => error.kind(),
-    Self::Corrections(error) => error.kind(),
     Self::Image(error) => error.kind(),
     Self::Images(error) => error.kind(),
-    Self::Camera(error) => error.kind(),
     Self::Text(error) => error.kind(),
     Self::Job(error) => error.kind(),
     Self::Cancelled(error) => error.kind(),

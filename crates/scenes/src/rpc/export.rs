@@ -21,7 +21,7 @@ use serde_json::{Value, json};
 
 use super::error::RpcJobError;
 use super::export_scene::{Scene, scene_of};
-use job::error::{ImageInputError, JobError, SettingError};
+use job::error::{JobError, SettingError};
 use job::files;
 use job::output_folder::OutputFolder;
 
@@ -233,7 +233,7 @@ impl Export<'_> {
         name: &str,
         progress: &dyn Progress,
     ) -> Result<([usize; 2], [i64; 2], f64), RpcJobError> {
-        let camera = self.scene.corrections.camera(path, progress).map_err(ImageInputError::from)?;
+        let camera = self.scene.corrections.camera(path, progress)?;
         let source = ImageSource::open(path)?;
         let window = self.window(&source, &camera).ok_or_else(|| RpcJobError::Outside { path: path.to_owned() })?;
         if window.width.saturating_mul(window.height) > PIXELS_MAX {

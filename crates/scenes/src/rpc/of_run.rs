@@ -5,7 +5,7 @@ use std::path::Path;
 use camera::RpcCamera;
 
 use job::corrections::image_of_run;
-use job::error::ImageInputError;
+use job::error::JobError;
 
 /// Returns the camera of an image with the pointing correction that a DSM run found for it.
 ///
@@ -14,9 +14,9 @@ use job::error::ImageInputError;
 /// path given here, or else where the run found it.
 ///
 /// # Errors
-/// [`ImageInputError`] if the folder holds no report, the run did not use the image, or the image
-/// has no usable RPC.
-pub fn camera_of_run(run: &Path, image: &Path) -> Result<RpcCamera, ImageInputError> {
+/// [`JobError`] if the folder holds no report, the run did not use the image, or the image has no
+/// usable RPC.
+pub fn camera_of_run(run: &Path, image: &Path) -> Result<RpcCamera, JobError> {
     let (place, correction) = image_of_run(run, image)?;
     Ok(RpcCamera { rpc: io::rpc::read_for_image(&place)?.rpc, correction })
 }

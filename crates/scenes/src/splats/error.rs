@@ -14,19 +14,12 @@ use io::similarity::SimilarityFileError;
 use io::splat_ply::{LocalOrigin, SplatPlyError};
 use numeric::{Cancelled, failures};
 
-use job::corrections::CorrectionsError;
-use job::error::{ImageInputError, JobError, SettingError, from_steps, job_errors};
+use job::error::{JobError, SettingError, from_steps, job_errors};
 use job::files::FileError;
-use job::map_surface::MapSurfaceError;
-use job::placed_model::PlacedModelError;
-use job::threads::ThreadsError;
 
 /// Splats that could not be made or rendered.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum SplatsJobError {
-    /// The surface model cannot be used.
-    #[error(transparent)]
-    Surface(#[from] MapSurfaceError),
     /// No cell of the surface model has a height.
     #[error("the surface model has no height: {}", path.display())]
     NoHeight {
@@ -36,9 +29,6 @@ pub(crate) enum SplatsJobError {
     /// The confidence of the cells cannot be read.
     #[error("cannot read the confidence")]
     Confidence(#[source] RasterError),
-    /// A satellite image cannot be read with its camera.
-    #[error(transparent)]
-    Image(#[from] ImageInputError),
     /// An image shows another place.
     #[error("the image does not see {target}: {}", path.display())]
     NotSeen {
@@ -73,9 +63,6 @@ pub(crate) enum SplatsJobError {
     /// Neither images nor perspective cameras were given.
     #[error("nothing to look through: expected images or perspective cameras")]
     NoCamera,
-    /// The perspective cameras cannot be used.
-    #[error(transparent)]
-    Cameras(#[from] PlacedModelError),
     /// An image of the camera model refers to a camera that does not exist.
     #[error("image {name} of the model has no camera")]
     NoLens {
@@ -154,12 +141,9 @@ pub(crate) enum SplatsJobError {
 }
 
 failures!(SplatsJobError: Other {
-    Self::Surface(error) => error.kind(),
     Self::Confidence(error) => error.kind(),
-    Self::Image(error) => error.kind(),
     Self::Crs(error) => error.kind(),
     Self::Ply(error) => error.kind(),
-    Self::Cameras(error) => error.kind(),
     Self::City(error) => error.kind(),
     Self::Priors(error) => error.kind(),
     Self::Transform(error) => error.kind(),
@@ -171,4 +155,4 @@ job_errors!(SplatsJobError {
     Self::NotPlaced { .. } => Some("the place of the splats"),
 });
 
-from_steps!(SplatsJobError: Job(FileError, ThreadsError, SettingError, Cancelled), Image(RasterError, RpcReadError, CorrectionsError));
+from_steps!(SplatsJobError: Job(FileError, SettingError, Cancelled, RasterError, RpcReadError));

@@ -37,7 +37,7 @@ use job::dataset_folder::{UNKNOWN_DATUM, UNKNOWN_FRAME, dataset_folder, sparse_f
 use job::error::{JobError, SettingError};
 use job::files::{self, FileError};
 use job::output_folder::OutputFolder;
-use job::placed_model::{self, PlacedModelError};
+use job::placed_model;
 use job::report_page;
 use job::threads::install;
 
@@ -229,8 +229,8 @@ enum Reference {
 impl RenderSession<'_> {
     fn run(mut self, progress: &dyn Progress) -> Result<Vec<SplatRenderView>, SplatsJobError> {
         let placed = |folder: &PathBuf| match &self.file.origin {
-            Some(origin) => Ok::<_, SplatsJobError>(placed_model::read(folder, origin)?),
-            None => Ok(io::colmap::read(&sparse_folder(folder)).map_err(PlacedModelError::from)?),
+            Some(origin) => placed_model::read(folder, origin),
+            None => Ok(io::colmap::read(&sparse_folder(folder))?),
         };
         let model = self.config.cameras.as_ref().map(placed).transpose()?;
         let beside = pointing_path(&self.config.splats);

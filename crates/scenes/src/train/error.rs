@@ -12,12 +12,8 @@ use io::rpc::RpcReadError;
 use io::splat_ply::SplatPlyError;
 use numeric::{Cancelled, failures};
 
-use job::corrections::CorrectionsError;
-use job::dataset_folder::DatasetOriginError;
-use job::error::{ImageInputError, JobError, SettingError, from_steps, job_errors};
+use job::error::{JobError, SettingError, from_steps, job_errors};
 use job::files::FileError;
-use job::map_surface::MapSurfaceError;
-use job::threads::ThreadsError;
 
 /// A training that gives no splats.
 #[derive(Debug, thiserror::Error)]
@@ -31,12 +27,6 @@ pub(crate) enum TrainError {
     /// A prior map cannot be read.
     #[error(transparent)]
     Map(#[from] NpyError),
-    /// An image cannot be read, or not with its camera.
-    #[error(transparent)]
-    Image(#[from] ImageInputError),
-    /// The surface model cannot be used.
-    #[error(transparent)]
-    Surface(#[from] MapSurfaceError),
     /// A coordinate reference system cannot be used.
     #[error(transparent)]
     Crs(#[from] CrsError),
@@ -51,9 +41,6 @@ pub(crate) enum TrainError {
         /// What was found and what was expected.
         what: String,
     },
-    /// The origin of the dataset cannot be read.
-    #[error(transparent)]
-    Origin(#[from] DatasetOriginError),
     /// No camera has an image.
     #[error("none of {cameras} cameras has an image, expected files with the cameras' names in {}", folder.display())]
     NoImages {
@@ -149,17 +136,13 @@ failures!(TrainError: Other {
     Self::Model(error) => error.kind(),
     Self::Transforms(error) => error.kind(),
     Self::Map(error) => error.kind(),
-    Self::Image(error) => error.kind(),
-    Self::Surface(error) => error.kind(),
     Self::Crs(error) => error.kind(),
     Self::Ply(error) => error.kind(),
-    Self::Origin(error) => error.kind(),
     Self::Job(error) => error.kind(),
 });
 
 job_errors!(TrainError);
 
 from_steps!(
-    TrainError: Job(FileError, ThreadsError, SettingError, Cancelled),
-    Image(RasterError, RpcReadError, CorrectionsError)
+    TrainError: Job(FileError, SettingError, Cancelled, RasterError, RpcReadError)
 );

@@ -10,17 +10,12 @@ use io::rpc::RpcReadError;
 use numeric::{Cancelled, failures};
 
 use crate::ortho::OrthoError;
-use job::corrections::CorrectionsError;
-use job::error::{ImageInputError, JobError, SettingError, from_steps, job_errors};
+use job::error::{JobError, SettingError, from_steps, job_errors};
 use job::files::FileError;
-use job::threads::ThreadsError;
 
 /// A building index that cannot be made.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum BuildingMapError {
-    /// The image cannot be read.
-    #[error(transparent)]
-    Image(#[from] ImageInputError),
     /// The image is too large to be looked at at once.
     #[error("the image has {width} x {height} pixels, at most 2^28: cut it into parts: {}", path.display())]
     TooLarge {
@@ -60,7 +55,6 @@ pub(crate) enum BuildingMapError {
 }
 
 failures!(BuildingMapError: Other {
-    Self::Image(error) => error.kind(),
     Self::Crs(error) => error.kind(),
     Self::Surface(error) => error.kind(),
     Self::Job(error) => error.kind(),
@@ -72,8 +66,7 @@ job_errors!(BuildingMapError {
 });
 
 from_steps!(
-    BuildingMapError: Job(SettingError, FileError, ThreadsError, Cancelled),
-    Image(RasterError, RpcReadError, CorrectionsError),
+    BuildingMapError: Job(SettingError, FileError, Cancelled, RasterError, RpcReadError),
 );
 
 impl From<OrthoError> for BuildingMapError {

@@ -10,10 +10,8 @@ use terrain::TerrainError;
 use crate::dtm::DtmError;
 use crate::eval::EvalJobError;
 use crate::ortho::OrthoError;
-use job::corrections::CorrectionsError;
-use job::error::{ImageInputError, JobError, SettingError, from_steps, job_errors};
+use job::error::{JobError, SettingError, from_steps, job_errors};
 use job::files::FileError;
-use job::threads::ThreadsError;
 
 /// A class raster that cannot be made.
 #[derive(Debug, thiserror::Error)]
@@ -38,9 +36,6 @@ pub(crate) enum ClassesError {
     /// The vegetation index cannot be read at the cells of the surface.
     #[error("cannot use the vegetation index")]
     Index(#[source] Box<EvalJobError>),
-    /// A multispectral image cannot be read.
-    #[error(transparent)]
-    Image(#[from] ImageInputError),
     /// A multispectral image does not say which bands are red and near infrared.
     #[error(
         "the image has {bands} bands and does not say which are red and near infrared: name the bands, in their \
@@ -81,7 +76,6 @@ pub(crate) enum ClassesError {
 failures!(ClassesError: Other {
     Self::Surface(error) => error.kind(),
     Self::Index(error) => error.kind(),
-    Self::Image(error) => error.kind(),
     Self::Ortho(error) => error.kind(),
     Self::Cue(error) => error.kind(),
     Self::Job(error) => error.kind(),
@@ -93,15 +87,13 @@ job_errors!(ClassesError {
 
 from_steps!(
     ClassesError: Index(EvalJobError),
-    Image(RasterError, CorrectionsError),
-    Job(FileError, ThreadsError, SettingError, Cancelled),
+    Job(FileError, SettingError, Cancelled, RasterError),
 );
 
 impl From<OrthoError> for ClassesError {
     fn from(error: OrthoError) -> Self {
         match error {
             OrthoError::Job(job) => Self::Job(job),
-            OrthoError::Image(image) => Self::Image(image),
             other => Self::Ortho(other.into()),
         }
     }

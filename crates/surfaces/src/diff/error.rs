@@ -11,7 +11,6 @@ use numeric::{Cancelled, failures};
 use crate::eval::EvalJobError;
 use job::error::{JobError, from_steps, job_errors};
 use job::files::FileError;
-use job::threads::ThreadsError;
 
 /// A change that cannot be measured.
 #[derive(Debug, thiserror::Error)]
@@ -51,4 +50,4 @@ failures!(DiffError: Other {
 
 job_errors!(DiffError);
 
-from_steps!(DiffError: Surfaces(EvalJobError), Job(FileError, ThreadsError, Cancelled));
+from_steps!(DiffError: Surfaces(EvalJobError), Job(FileError, Cancelled));

@@ -9,7 +9,6 @@ use terrain::TerrainError;
 
 use job::error::{JobError, from_steps, job_errors};
 use job::files::FileError;
-use job::threads::ThreadsError;
 
 /// A terrain model that cannot be made.
 #[derive(Debug, thiserror::Error)]
@@ -58,7 +57,7 @@ failures!(DtmError: Other {
 
 job_errors!(DtmError);
 
-from_steps!(DtmError: Job(FileError, ThreadsError, Cancelled));
+from_steps!(DtmError: Job(FileError, Cancelled));
 
 impl From<TerrainError> for DtmError {
     fn from(error: TerrainError) -> Self {

@@ -7,7 +7,6 @@ use numeric::{Cancelled, Kind, failures};
 
 use job::error::{FileCrsError, JobError, SettingError, from_steps, job_errors};
 use job::files::FileError;
-use job::threads::ThreadsError;
 
 /// An evaluation that cannot be made.
 #[derive(Debug, thiserror::Error)]
@@ -161,4 +160,4 @@ job_errors!(EvalJobError {
     Self::Grids(eval::EvalError::SkipWithoutClasses) => Some("the classes"),
 });
 
-from_steps!(EvalJobError: Job(SettingError, FileError, ThreadsError, Cancelled));
+from_steps!(EvalJobError: Job(SettingError, FileError, Cancelled));

@@ -9,9 +9,6 @@ use crate::camera_stand::StandError;
 use crate::city_files::CitySurfaceError;
 use job::error::{JobError, SettingError, from_steps, job_errors};
 use job::files::FileError;
-use job::map_surface::MapSurfaceError;
-use job::placed_model::PlacedModelError;
-use job::threads::ThreadsError;
 
 /// Ground views that cannot be made.
 #[derive(Debug, thiserror::Error)]
@@ -28,9 +25,6 @@ pub(crate) enum GroundViewError {
         /// The folder.
         path: PathBuf,
     },
-    /// The surface model cannot be used.
-    #[error(transparent)]
-    Surface(#[from] MapSurfaceError),
     /// The surface has no height.
     #[error("the surface has no height: {}", path.display())]
     NoHeights {
@@ -63,7 +57,7 @@ pub(crate) enum GroundViewError {
     Crs(#[from] CrsError),
     /// The cameras of a COLMAP model cannot be used.
     #[error(transparent)]
-    PlacedModel(#[from] PlacedModelError),
+    PlacedModel(JobError),
     /// Two images of a model would have the same file names.
     #[error("two images would be written as {stem}")]
     SameName {
@@ -111,7 +105,6 @@ failures!(GroundViewError: Other {
     Self::FolderInUse { .. } => Kind::OutputExists,
     Self::Stand(error) => error.kind(),
     Self::Positions(error) => error.kind(),
-    Self::Surface(error) => error.kind(),
     Self::City(error) => error.kind(),
     Self::Crs(error) => error.kind(),
     Self::PlacedModel(error) => error.kind(),
@@ -125,4 +118,4 @@ job_errors!(GroundViewError {
     Self::PlacedModel(_) => Some("the cameras"),
 });
 
-from_steps!(GroundViewError: Job(SettingError, FileError, ThreadsError, Cancelled));
+from_steps!(GroundViewError: Job(SettingError, FileError, Cancelled));

@@ -84,7 +84,7 @@ impl Shots {
 
     /// Lays out the cameras of a COLMAP model.
     fn of_model(folder: &Path, surface: &ViewSurface, panorama: Panorama) -> Result<Self, GroundViewError> {
-        let model = placed_model::read(folder, &surface.local_origin())?;
+        let model = placed_model::read(folder, &surface.local_origin()).map_err(GroundViewError::PlacedModel)?;
         let mut taken = HashSet::new();
         let mut shots = Vec::with_capacity(model.views.len());
         for view in model.views {

@@ -10,7 +10,6 @@ use crate::camera_stand::StandError;
 use crate::city_files::CitySurfaceError;
 use job::error::{FileCrsError, JobError, from_steps, job_errors};
 use job::files::FileError;
-use job::threads::ThreadsError;
 
 /// A height map that cannot be made or unprojected.
 #[derive(Debug, thiserror::Error)]
@@ -178,4 +177,4 @@ job_errors!(HeightMapJobError {
     Self::MirroredAxes => Some("the axes of the splats"),
 });
 
-from_steps!(HeightMapJobError: Job(FileError, ThreadsError, Cancelled));
+from_steps!(HeightMapJobError: Job(FileError, Cancelled));

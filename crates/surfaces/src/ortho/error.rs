@@ -7,17 +7,12 @@ use io::raster::RasterError;
 use io::rpc::RpcReadError;
 use numeric::{Cancelled, failures};
 
-use job::corrections::CorrectionsError;
-use job::error::{ImageInputError, JobError, SettingError, from_steps, job_errors};
+use job::error::{JobError, SettingError, from_steps, job_errors};
 use job::files::FileError;
-use job::threads::ThreadsError;
 
 /// An ortho that cannot be made.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum OrthoError {
-    /// A satellite image cannot be read with its camera.
-    #[error(transparent)]
-    Image(#[from] ImageInputError),
     /// The surface model names no coordinate reference system.
     #[error("the surface model has no coordinate reference system: {}", path.display())]
     NoCrs {
@@ -93,7 +88,6 @@ pub(crate) enum OrthoError {
 }
 
 failures!(OrthoError: Other {
-    Self::Image(error) => error.kind(),
     Self::Crs(error) => error.kind(),
     Self::Job(error) => error.kind(),
 });
@@ -103,4 +97,4 @@ job_errors!(OrthoError {
     Self::TooLarge { .. } => Some("the area"),
 });
 
-from_steps!(OrthoError: Job(SettingError, FileError, ThreadsError, Cancelled), Image(RasterError, RpcReadError, CorrectionsError));
+from_steps!(OrthoError: Job(SettingError, FileError, Cancelled, RasterError, RpcReadError));

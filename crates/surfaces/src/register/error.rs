@@ -10,18 +10,12 @@ use io::splat_ply::SplatPlyError;
 use numeric::{Cancelled, failures};
 
 use crate::ortho::OrthoError;
-use job::corrections::CorrectionsError;
-use job::error::{ImageInputError, JobError, SettingError, from_steps, job_errors};
+use job::error::{JobError, SettingError, from_steps, job_errors};
 use job::files::FileError;
-use job::map_surface::MapSurfaceError;
-use job::threads::ThreadsError;
 
 /// An image that cannot be registered.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum RegisterError {
-    /// The surface model cannot be used.
-    #[error(transparent)]
-    Surface(#[from] MapSurfaceError),
     /// The model has no heights.
     #[error("the model has no heights: {}", path.display())]
     NoHeights {
@@ -62,9 +56,6 @@ pub(crate) enum RegisterError {
     /// An image cannot be laid on the surface.
     #[error(transparent)]
     Laid(Box<OrthoError>),
-    /// A satellite image cannot be read with its camera.
-    #[error(transparent)]
-    Image(#[from] ImageInputError),
     /// A coordinate reference system cannot be used.
     #[error(transparent)]
     Crs(#[from] CrsError),
@@ -97,10 +88,8 @@ pub(crate) enum RegisterError {
 }
 
 failures!(RegisterError: Other {
-    Self::Surface(error) => error.kind(),
     Self::Splats(error) => error.kind(),
     Self::Laid(error) => error.kind(),
-    Self::Image(error) => error.kind(),
     Self::Crs(error) => error.kind(),
     Self::Job(error) => error.kind(),
 });
@@ -112,7 +101,6 @@ job_errors!(RegisterError {
 });
 
 from_steps!(
-    RegisterError: Job(SettingError, FileError, ThreadsError, Cancelled),
-    Image(RasterError, RpcReadError, CorrectionsError),
+    RegisterError: Job(SettingError, FileError, Cancelled, RasterError, RpcReadError),
     Laid(OrthoError)
 );

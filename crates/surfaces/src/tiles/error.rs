@@ -10,17 +10,12 @@ use numeric::{Cancelled, Kind, failures};
 use crate::camera_stand::StandError;
 use crate::heightmap::HeightMapJobError;
 use crate::ortho::OrthoError;
-use job::corrections::CorrectionsError;
-use job::error::{ImageInputError, JobError, from_steps, job_errors};
+use job::error::{JobError, from_steps, job_errors};
 use job::files::FileError;
-use job::threads::ThreadsError;
 
 /// Tiles that cannot be made.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum TilesError {
-    /// A satellite image cannot be read with its camera.
-    #[error(transparent)]
-    Image(#[from] ImageInputError),
     /// A height map cannot be made.
     #[error(transparent)]
     Map(#[from] HeightMapJobError),
@@ -55,7 +50,6 @@ pub(crate) enum TilesError {
 
 failures!(TilesError: Other {
     Self::OtherTile { .. } => Kind::OutputExists,
-    Self::Image(error) => error.kind(),
     Self::Map(error) => error.kind(),
     Self::Ortho(error) => error.kind(),
     Self::Job(error) => error.kind(),
@@ -67,4 +61,4 @@ job_errors!(TilesError {
     Self::NoImages { .. } => Some("the images"),
 });
 
-from_steps!(TilesError: Job(FileError, ThreadsError, Cancelled), Image(RasterError, RpcReadError, CorrectionsError), Map(StandError, PositionsError));
+from_steps!(TilesError: Job(FileError, Cancelled, RasterError, RpcReadError), Map(StandError, PositionsError));
