@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use city::DefectCode;
 use numeric::failures;
 
+use io::FormatError;
 use io::atomic::SaveError;
 
 /// Why a city model was not read or written.
@@ -44,6 +45,18 @@ pub enum CityError {
 }
 
 failures!(CityError: File { Self::NotWritten(error) => error.kind() });
+
+impl From<CityError> for FormatError {
+    fn from(error: CityError) -> Self {
+        let path = match &error {
+            CityError::Unreadable { path, .. } | CityError::TooLarge { path, .. } | CityError::Refused { path, .. } => {
+                path.clone()
+            }
+            CityError::NotWritten(error) => error.path().to_owned(),
+        };
+        Self::of(&path, error)
+    }
+}
 
 /// A fault of the content of a file, with its number in the catalogue and its place.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

@@ -10,12 +10,10 @@ use std::path::{Path, PathBuf};
 
 use city::{MeshConfig, ObjectStatus, TriangleMesh};
 use crs::{CrsIdentity, VerticalDatum};
-use numeric::failures;
 
-use crate::CityError;
-use io::open_regular;
-use io::points::{PointCloud, PointsError, is_point_cloud};
-use io::splat_ply::{LocalOrigin, SplatPlyError};
+use io::points::{PointCloud, is_point_cloud};
+use io::splat_ply::LocalOrigin;
+use io::{FormatError, open_regular};
 
 /// Largest number of points of a cloud.
 const POINTS_MAX: u64 = 200_000_000;
@@ -40,35 +38,6 @@ pub struct SurfaceFile {
     /// Notes that a report on the surface must show.
     pub notes: Vec<String>,
 }
-
-/// Why a surface was not read.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum SurfaceFileError {
-    /// A city model or mesh was not read.
-    #[error(transparent)]
-    City(#[from] CityError),
-    /// A cloud was not read.
-    #[error(transparent)]
-    Points(#[from] PointsError),
-    /// The origin beside a file was not read.
-    #[error(transparent)]
-    Origin(#[from] SplatPlyError),
-    /// The model has no triangles, or the cloud no points.
-    #[error("{what}: {}", .path.display())]
-    Nothing {
-        /// Path of the file.
-        path: PathBuf,
-        /// What was found, and what was expected.
-        what: String,
-    },
-}
-
-failures!(SurfaceFileError: File {
-    Self::City(error) => error.kind(),
-    Self::Points(error) => error.kind(),
-    Self::Origin(error) => error.kind(),
-});
 
 /// Returns whether a file holds a surface that is not a raster.
 ///
@@ -99,10 +68,9 @@ fn is_ply(bytes: &[u8]) -> bool {
 /// Reads a surface. `config` selects the objects and the levels of detail of a city model.
 ///
 /// # Errors
-/// - [`SurfaceFileError::City`] and [`SurfaceFileError::Points`] when the file cannot be read.
-/// - [`SurfaceFileError::Origin`] when the origin beside the file is invalid.
-/// - [`SurfaceFileError::Nothing`] when no object has triangles, or a cloud has no points.
-pub fn read(path: impl AsRef<Path>, config: &MeshConfig) -> Result<SurfaceFile, SurfaceFileError> {
+/// [`FormatError`] when the file cannot be read, the origin beside it is invalid, no object has
+/// triangles, or a cloud has no points.
+pub fn read(path: impl AsRef<Path>, config: &MeshConfig) -> Result<SurfaceFile, FormatError> {
     let path = path.as_ref();
     if is_point_cloud(path) {
         return cloud(path);
@@ -116,7 +84,7 @@ pub fn read(path: impl AsRef<Path>, config: &MeshConfig) -> Result<SurfaceFile, 
 }
 
 /// Reads a LAS or LAZ cloud.
-fn cloud(path: &Path) -> Result<SurfaceFile, SurfaceFileError> {
+fn cloud(path: &Path) -> Result<SurfaceFile, FormatError> {
     let cloud = PointCloud::open(path)?;
     let (crs, horizontal_epsg, vertical) =
         (cloud.crs_definition().map(str::to_owned), cloud.horizontal_epsg(), cloud.vertical());
@@ -134,7 +102,7 @@ fn cloud(path: &Path) -> Result<SurfaceFile, SurfaceFileError> {
 }
 
 /// Reads a PLY file as mesh or cloud, and adds its origin.
-fn ply(path: &Path, bytes: &[u8], config: &MeshConfig) -> Result<SurfaceFile, SurfaceFileError> {
+fn ply(path: &Path, bytes: &[u8], config: &MeshConfig) -> Result<SurfaceFile, FormatError> {
     let points = crate::ply_points(bytes).map_err(|fault| fault.at(path))?;
     let mut surface = if points.has_faces {
         city_model(path, config)?
@@ -146,7 +114,7 @@ fn ply(path: &Path, bytes: &[u8], config: &MeshConfig) -> Result<SurfaceFile, Su
     let comment = |key: &str| points.comments.iter().find_map(|line| line.strip_prefix(key)).map(str::trim);
     let commented =
         comment("origin ").and_then(numbers).map(|origin| (origin, comment("crs ").map(str::to_owned), None));
-    let beside = || -> Result<_, SplatPlyError> {
+    let beside = || -> Result<_, FormatError> {
         let found = LocalOrigin::read_beside(path)?;
         Ok(found.map(|found| (found.origin, Some(found.crs), found.vertical.parse().ok())))
     };
@@ -173,9 +141,9 @@ fn numbers(text: &str) -> Option<[f64; 3]> {
 }
 
 /// Reads a city model or mesh as triangles.
-fn city_model(path: &Path, config: &MeshConfig) -> Result<SurfaceFile, SurfaceFileError> {
+fn city_model(path: &Path, config: &MeshConfig) -> Result<SurfaceFile, FormatError> {
     let file = crate::read(path)?;
-    let wrong = |error: city::ModelError| SurfaceFileError::Nothing { path: path.to_owned(), what: error.to_string() };
+    let wrong = |error: city::ModelError| FormatError::new(path, error);
     let meshed = TriangleMesh::from_model(&file.model, config).map_err(wrong)?;
     let used = meshed.objects.iter().filter(|object| matches!(object.status, ObjectStatus::Used { .. })).count();
     let what = format!("none of the {} objects has triangles at the selected level of detail", meshed.objects.len());
@@ -198,8 +166,8 @@ fn city_model(path: &Path, config: &MeshConfig) -> Result<SurfaceFile, SurfaceFi
     Ok(surface)
 }
 
-fn nothing_if(is_empty: bool, path: &Path, what: &str) -> Result<(), SurfaceFileError> {
-    if is_empty { Err(SurfaceFileError::Nothing { path: path.to_owned(), what: what.to_owned() }) } else { Ok(()) }
+fn nothing_if(is_empty: bool, path: &Path, what: &str) -> Result<(), FormatError> {
+    if is_empty { Err(FormatError::new(path, what)) } else { Ok(()) }
 }
 
 impl SurfaceFile {
@@ -267,7 +235,8 @@ mod tests {
         let error = read(&path, &MeshConfig::default()).unwrap_err().to_string();
         assert!(error.contains("901") && error.contains("vertex 1"), "{error}");
         let (_kept, path) = write("d.ply", "ply\nformat ascii 1.0\nend_header\n");
-        assert!(matches!(read(&path, &MeshConfig::default()), Err(SurfaceFileError::Nothing { .. })));
+        let error = read(&path, &MeshConfig::default()).unwrap_err().to_string();
+        assert!(error.starts_with("the file has neither points nor polygons: "), "{error}");
     }
 
     #[test]

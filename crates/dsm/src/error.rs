@@ -138,7 +138,7 @@ pub enum DsmError {
     Area(#[from] io::areas::AreaError),
     /// The ground points cannot be used.
     #[error(transparent)]
-    Control(#[from] io::ground_points::GroundPointsError),
+    Control(io::FormatError),
     /// The pointing corrections to start from cannot be read.
     #[error(transparent)]
     Corrections(JobError),

@@ -59,6 +59,13 @@ impl SaveError {
         Self::Unwritable { path: path.to_owned(), reason: reason.to_string() }
     }
 
+    /// Returns the path of the output, or of its folder where the disk is full.
+    pub fn path(&self) -> &Path {
+        match self {
+            Self::Exists { path } | Self::Unwritable { path, .. } | Self::NoSpace { path, .. } => path,
+        }
+    }
+
     /// Wraps an error of the system without the temporary name that `tempfile` adds to its text.
     fn system(path: &Path, error: &std::io::Error) -> Self {
         Self::unwritable(path, error.kind())

@@ -11,11 +11,11 @@
 //!
 //! Empty lines and lines that begin with `#` are ignored.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use geodesy::{LonLatHeight, MapPoint};
-use numeric::failures;
 
+use crate::format_error::FormatError;
 use crate::regular::read_regular;
 
 /// Largest file that is read, bytes.
@@ -54,51 +54,21 @@ pub struct ControlPosition {
     pub place: Place,
 }
 
-/// A table that cannot be read.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum ControlError {
-    /// The file cannot be read.
-    #[error("cannot read the file ({source}): {}", .path.display())]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// The error of the system.
-        source: std::io::Error,
-    },
-    /// A line that breaks the format.
-    #[error("{what} (line {line}): {}", .path.display())]
-    Invalid {
-        /// The file.
-        path: PathBuf,
-        /// The text found and the text expected.
-        what: String,
-        /// Number of the line, from 1.
-        line: usize,
-    },
-}
-
-failures!(ControlError: File);
-
 /// Reads a table of positions.
 ///
 /// # Errors
-/// [`ControlError::Unreadable`] when the system refuses. [`ControlError::Invalid`] for a file
-/// larger than 256 MiB, a missing column, a value that is not a finite number, an empty name, or a
-/// latitude beyond the poles.
-pub fn read(path: &Path) -> Result<Vec<ControlPosition>, ControlError> {
-    let unreadable = |source| ControlError::Unreadable { path: path.to_owned(), source };
+/// [`FormatError`] when the system refuses, for a file larger than 256 MiB, a missing column, a
+/// value that is not a finite number, an empty name, or a latitude beyond the poles.
+pub fn read(path: &Path) -> Result<Vec<ControlPosition>, FormatError> {
+    let unreadable = |source| FormatError::unreadable(path, "the file", source);
+    let invalid = |(line, what): Fault| FormatError::new(path, format_args!("{what} (line {line})"));
     let size = std::fs::metadata(path).map_err(unreadable)?.len();
     if size > SIZE_LIMIT {
         let what = format!("the file has {size} bytes, expected at most {SIZE_LIMIT}");
-        return Err(ControlError::Invalid { path: path.to_owned(), what, line: 1 });
+        return Err(invalid((1, what)));
     }
     let bytes = read_regular(path, SIZE_LIMIT).map_err(unreadable)?;
-    parse(&String::from_utf8_lossy(&bytes)).map_err(|(line, what)| ControlError::Invalid {
-        path: path.to_owned(),
-        what,
-        line,
-    })
+    parse(&String::from_utf8_lossy(&bytes)).map_err(invalid)
 }
 
 /// A defect: the number of the line, and the text found and expected.

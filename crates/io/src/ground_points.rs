@@ -25,9 +25,9 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use camera::ImagePoint;
-use numeric::failures;
 use serde_json::Value;
 
+use crate::format_error::FormatError;
 use crate::positions::records;
 use crate::regular::read_regular;
 
@@ -85,30 +85,6 @@ pub struct ImagePlace {
     pub place: ImagePoint,
 }
 
-/// A file of ground points that cannot be used.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum GroundPointsError {
-    /// The file cannot be read.
-    #[error("cannot read the ground points ({source}): {}", path.display())]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// The error of the system.
-        source: std::io::Error,
-    },
-    /// The content is not what is expected.
-    #[error("cannot use the ground points ({what}): {}", path.display())]
-    Invalid {
-        /// The file.
-        path: PathBuf,
-        /// The content found and the content expected.
-        what: String,
-    },
-}
-
-failures!(GroundPointsError: File);
-
 /// Reads ground points.
 ///
 /// ```
@@ -124,11 +100,12 @@ failures!(GroundPointsError: File);
 /// ```
 ///
 /// # Errors
-/// [`GroundPointsError`].
-pub fn read_ground_points(path: &Path) -> Result<Vec<GroundPoint>, GroundPointsError> {
-    let unreadable = |source| GroundPointsError::Unreadable { path: path.to_owned(), source };
+/// [`FormatError`] when the system refuses, for a row that cannot be used, and for a chip that is
+/// no file.
+pub fn read_ground_points(path: &Path) -> Result<Vec<GroundPoint>, FormatError> {
+    let unreadable = |source| FormatError::unreadable(path, "the ground points", source);
     let bytes = read_regular(path, SIZE_LIMIT).map_err(unreadable)?;
-    let invalid = |what| GroundPointsError::Invalid { path: path.to_owned(), what };
+    let invalid = |what: String| FormatError::new(path, format_args!("cannot use the ground points ({what})"));
     let mut points = parse(&String::from_utf8_lossy(&bytes)).map_err(invalid)?;
     let folder = path.parent().unwrap_or(Path::new(""));
     for chip in points.iter_mut().filter_map(|point| point.chip.as_mut()) {

@@ -7,11 +7,12 @@
 
 pub mod areas;
 pub mod atomic;
-pub mod camera_file;
+mod camera_file;
 pub mod colmap;
 pub mod coloured_mesh;
 pub mod control;
 mod download;
+mod format_error;
 mod geoparquet;
 pub mod gltf;
 pub mod ground_points;
@@ -34,4 +35,5 @@ pub mod vectors;
 
 pub use atomic::{SaveError, write_bytes};
 pub use download::download;
+pub use format_error::FormatError;
 pub use regular::{open as open_regular, read_regular, read_regular_text};

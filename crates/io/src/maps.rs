@@ -4,12 +4,12 @@
 //! No-data becomes NaN. A depth PNG with a step (`depth_step_m`, see
 //! [`crate::raster::write_depth_png`]) is converted to metres, where 0 is no depth.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use numeric::failures;
 use raster::Window;
 
-use crate::npy::{self, NpyData, NpyError};
+use crate::format_error::FormatError;
+use crate::npy::{self, NpyData};
 use crate::raster::{ImageSource, RasterError, SampleType};
 use crate::regular;
 
@@ -31,31 +31,6 @@ pub struct MapFile {
     pub is_mask: bool,
 }
 
-/// A map that was not read.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum MapError {
-    /// A NumPy array was not read.
-    #[error(transparent)]
-    Npy(#[from] NpyError),
-    /// A raster was not read.
-    #[error(transparent)]
-    Raster(#[from] RasterError),
-    /// The shape is not that of a map.
-    #[error(
-        "the shape is {shape:?}, expected rows x columns or rows x columns x channels, at most 2^30 numbers: {}",
-        .path.display()
-    )]
-    Shape {
-        /// The file.
-        path: PathBuf,
-        /// The shape found.
-        shape: Vec<usize>,
-    },
-}
-
-failures!(MapError: File { Self::Npy(error) => error.kind(), Self::Raster(error) => error.kind() });
-
 /// Whether the first bytes of a file are those of a NumPy array.
 pub fn is_npy(path: impl AsRef<Path>) -> bool {
     use std::io::Read;
@@ -66,39 +41,46 @@ pub fn is_npy(path: impl AsRef<Path>) -> bool {
 /// Reads a map.
 ///
 /// # Errors
-/// [`MapError::Shape`] for an array or raster of another shape, or with more than 2³⁰ values;
-/// [`MapError::Npy`] and [`MapError::Raster`] for a file that cannot be read.
-pub fn read(path: impl AsRef<Path>) -> Result<MapFile, MapError> {
+/// [`FormatError`] for an array or raster of another shape, or with more than 2³⁰ values, and for a
+/// file that cannot be read.
+pub fn read(path: impl AsRef<Path>) -> Result<MapFile, FormatError> {
     let path = path.as_ref();
     if is_npy(path) { from_npy(path) } else { from_raster(path) }
 }
 
-fn from_npy(path: &Path) -> Result<MapFile, MapError> {
+/// The error of a file whose shape is not that of a map.
+fn not_a_map(path: &Path, shape: &[usize]) -> FormatError {
+    let what = format!("the shape is {shape:?}, expected rows x columns or rows x columns x channels");
+    FormatError::new(path, what + ", at most 2^30 numbers")
+}
+
+fn from_npy(path: &Path) -> Result<MapFile, FormatError> {
     let array = npy::read(path)?;
     let (height, width, channels) = match array.shape[..] {
         [height, width] => (height, width, 1),
         [height, width, channels] if channels > 0 => (height, width, channels),
-        _ => return Err(MapError::Shape { path: path.to_owned(), shape: array.shape }),
+        _ => return Err(not_a_map(path, &array.shape)),
     };
     if array.data.len() > NUMBERS_MAX {
-        return Err(MapError::Shape { path: path.to_owned(), shape: array.shape });
+        return Err(not_a_map(path, &array.shape));
     }
     let is_mask = matches!(array.data, NpyData::Bool(_) | NpyData::U8(_));
     Ok(MapFile { width, height, channels, data: array.data.to_f64(), is_mask })
 }
 
-fn from_raster(path: &Path) -> Result<MapFile, MapError> {
-    let source = ImageSource::open(path)?;
+fn from_raster(path: &Path) -> Result<MapFile, FormatError> {
+    let unread = |error: RasterError| FormatError::of(path, error);
+    let source = ImageSource::open(path).map_err(unread)?;
     let info = source.info();
     let (width, height, channels) = (info.width, info.height, info.bands);
     if width.saturating_mul(height).saturating_mul(channels) > NUMBERS_MAX {
-        return Err(MapError::Shape { path: path.to_owned(), shape: vec![height, width, channels] });
+        return Err(not_a_map(path, &[height, width, channels]));
     }
     let step = source.metadata("").into_iter().find(|(key, _)| key == "depth_step_m");
     let step = step.and_then(|(_, value)| value.parse::<f64>().ok()).filter(|step| step.is_finite());
     let mut data = vec![0.0; width * height * channels];
     for band in 0..channels {
-        let values = source.read_band(band + 1, Window::whole(width, height))?;
+        let values = source.read_band(band + 1, Window::whole(width, height)).map_err(unread)?;
         for (pixel, &value) in values.data().iter().enumerate() {
             let is_void = info.no_data.is_some_and(|no_data| f64::from(value) == no_data);
             data[pixel * channels + band] = if is_void { f64::NAN } else { f64::from(value) * step.unwrap_or(1.0) };
@@ -139,6 +121,7 @@ mod tests {
         npy::write(at("n.npy"), &[1, 2, 3], &[0.0f32; 6], false).unwrap();
         assert_eq!(read(at("n.npy")).unwrap().channels, 3);
         npy::write(at("bad.npy"), &[6], &[0.0f32; 6], false).unwrap();
-        assert!(matches!(read(at("bad.npy")), Err(MapError::Shape { .. })));
+        let refused = read(at("bad.npy")).unwrap_err().to_string();
+        assert!(refused.starts_with("the shape is [6], expected rows x columns or "), "{refused}");
     }
 }

@@ -7,11 +7,11 @@
 //! that is not a list is an error. CSV follows RFC 4180: commas, quotes doubled inside quotes.
 
 use std::collections::HashSet;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use numeric::failures;
 use serde_json::Value;
 
+use crate::format_error::FormatError;
 use crate::regular::read_regular;
 
 /// Largest list that is read, bytes.
@@ -41,30 +41,6 @@ pub struct PositionRow {
     pub position: Result<Position, String>,
 }
 
-/// A list that cannot be used.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum PositionsError {
-    /// The file does not exist or may not be read.
-    #[error("cannot read the list of positions ({source}): {}", path.display())]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// The error of the system.
-        source: std::io::Error,
-    },
-    /// The file is not a list of positions.
-    #[error("not a list of positions ({what}): {}", path.display())]
-    Invalid {
-        /// The file.
-        path: PathBuf,
-        /// The content found and the content expected.
-        what: String,
-    },
-}
-
-failures!(PositionsError: File);
-
 /// Reads a list of positions.
 ///
 /// ```
@@ -80,12 +56,11 @@ failures!(PositionsError: File);
 /// ```
 ///
 /// # Errors
-/// [`PositionsError::Unreadable`] when the system refuses. [`PositionsError::Invalid`] for a file
-/// larger than 1 GiB, without rows or without a required column, for two rows with the same id, and
-/// for an id that cannot be the name of a file.
-pub fn read_positions(path: impl AsRef<Path>) -> Result<Vec<PositionRow>, PositionsError> {
+/// [`FormatError`] when the system refuses, for a file larger than 1 GiB, without rows or without a
+/// required column, for two rows with the same id, and for an id that cannot be the name of a file.
+pub fn read_positions(path: impl AsRef<Path>) -> Result<Vec<PositionRow>, FormatError> {
     let path = path.as_ref();
-    let unreadable = |source| PositionsError::Unreadable { path: path.to_owned(), source };
+    let unreadable = |source| FormatError::unreadable(path, "the list of positions", source);
     let size = std::fs::metadata(path).map_err(unreadable)?.len();
     let rows = if size > SIZE_LIMIT {
         Err(format!("it has {size} bytes, expected at most {SIZE_LIMIT}"))
@@ -93,7 +68,7 @@ pub fn read_positions(path: impl AsRef<Path>) -> Result<Vec<PositionRow>, Positi
         let bytes = read_regular(path, SIZE_LIMIT).map_err(unreadable)?;
         parse(&String::from_utf8_lossy(&bytes))
     };
-    rows.map_err(|what| PositionsError::Invalid { path: path.to_owned(), what })
+    rows.map_err(|what| FormatError::new(path, format_args!("not a list of positions ({what})")))
 }
 
 fn parse(text: &str) -> Result<Vec<PositionRow>, String> {

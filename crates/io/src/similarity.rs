@@ -18,48 +18,16 @@
 //! when the model has heights above the geoid and the cameras have ellipsoidal heights. Unknown
 //! keys are refused.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use camera::{Pose, Similarity, SimilarityError};
-use numeric::failures;
 use serde::Deserialize;
 
+use crate::format_error::FormatError;
 use crate::regular::read_regular;
 
 /// Largest file that is read, bytes.
 const SIZE_LIMIT: u64 = 1 << 20;
-
-/// A similarity that was not read.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum SimilarityFileError {
-    /// The file cannot be read.
-    #[error("cannot read the file ({source}): {}", .path.display())]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// The error of the system.
-        source: std::io::Error,
-    },
-    /// The file is not JSON of the documented form.
-    #[error("not a similarity ({what}): {}", .path.display())]
-    Invalid {
-        /// The file.
-        path: PathBuf,
-        /// The content found and the content expected.
-        what: String,
-    },
-    /// The numbers do not make a similarity.
-    #[error("{source}: {}", .path.display())]
-    Numbers {
-        /// The file.
-        path: PathBuf,
-        /// The defect of the numbers.
-        source: SimilarityError,
-    },
-}
-
-failures!(SimilarityFileError: File);
 
 /// A defect of the text or of its numbers.
 #[derive(Debug)]
@@ -104,21 +72,20 @@ enum Rotation {
 /// ```
 ///
 /// # Errors
-/// - [`SimilarityFileError::Unreadable`] when the system refuses.
-/// - [`SimilarityFileError::Invalid`] for a file larger than 1 MiB or not of the documented form.
-/// - [`SimilarityFileError::Numbers`] for a scale that is not positive, a matrix that mirrors or
-///   shears, and numbers that are not finite.
-pub fn read(path: impl AsRef<Path>) -> Result<Similarity, SimilarityFileError> {
+/// [`FormatError`] when the system refuses, for a file larger than 1 MiB or not of the documented
+/// form, for a scale that is not positive, a matrix that mirrors or shears, and numbers that are
+/// not finite.
+pub fn read(path: impl AsRef<Path>) -> Result<Similarity, FormatError> {
     let path = path.as_ref();
-    let unreadable = |source| SimilarityFileError::Unreadable { path: path.to_owned(), source };
+    let unreadable = |source| FormatError::unreadable(path, "the file", source);
     let size = std::fs::metadata(path).map_err(unreadable)?.len();
+    let invalid = |what: String| FormatError::new(path, format_args!("not a similarity ({what})"));
     if size > SIZE_LIMIT {
-        let what = format!("it has {size} bytes, expected at most {SIZE_LIMIT}");
-        return Err(SimilarityFileError::Invalid { path: path.to_owned(), what });
+        return Err(invalid(format!("it has {size} bytes, expected at most {SIZE_LIMIT}")));
     }
     parse(&read_regular(path, SIZE_LIMIT).map_err(unreadable)?).map_err(|fault| match fault {
-        Fault::Text(what) => SimilarityFileError::Invalid { path: path.to_owned(), what },
-        Fault::Numbers(source) => SimilarityFileError::Numbers { path: path.to_owned(), source },
+        Fault::Text(what) => invalid(what),
+        Fault::Numbers(source) => FormatError::because(path, source.to_string(), source),
     })
 }
 

@@ -66,8 +66,7 @@ pub struct StacItem {
 
 /// An item that does not lead to an image. The text does not name the item.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum StacError {
+pub(crate) enum StacError {
     /// The file cannot be read.
     #[error("cannot read the file: {0}")]
     Unreadable(std::io::Error),
@@ -116,15 +115,15 @@ pub enum StacError {
 }
 
 /// Returns whether a name is that of an item: it ends in `.json` or `.geojson`.
-pub fn is_item_name(path: &Path) -> bool {
+pub(crate) fn is_item_name(path: &Path) -> bool {
     path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json") || e.eq_ignore_ascii_case("geojson"))
 }
 
 /// Reads an item.
 ///
 /// # Errors
-/// [`StacError`].
-pub fn read_item(path: &Path) -> Result<StacItem, StacError> {
+/// [`StacError`] for a file that cannot be read, that is no item, or whose item leads to no image.
+pub(crate) fn read_item(path: &Path) -> Result<StacItem, StacError> {
     let bytes = read_limited(path)?;
     let value: Value = serde_json::from_slice(&bytes)
         .map_err(|error| StacError::NotAnItem { found: format!("not valid JSON ({error})") })?;

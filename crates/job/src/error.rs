@@ -5,7 +5,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 use crs::{CrsError, MapProjection};
-use io::colmap::ColmapError;
+use io::FormatError;
 use io::raster::RasterError;
 use io::rpc::RpcReadError;
 use numeric::{Cancelled, Failure, Kind, failures};
@@ -128,7 +128,7 @@ macro_rules! from_failures {
 
 pub(crate) use from_failures;
 
-from_failures!(FileError, Cancelled, RasterError, RpcReadError, ColmapError, CrsError);
+from_failures!(FileError, Cancelled, RasterError, RpcReadError, FormatError, CrsError);
 
 /// A setting outside of its range.
 #[derive(Debug, thiserror::Error)]

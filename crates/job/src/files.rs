@@ -4,12 +4,9 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use io::SaveError;
-use io::colmap::ColmapError;
-use io::npy::NpyError;
 use io::raster::RasterError;
-use io::splat_ply::SplatPlyError;
-use numeric::{Kind, failures};
+use io::{FormatError, SaveError};
+use numeric::{Failure, Kind, failures};
 use serde::Serialize;
 
 /// Largest text that a job reads whole: a report, a configuration, an origin, bytes.
@@ -109,22 +106,23 @@ failures!(FileError: File {
     Self::InUse { .. } => Kind::InUse,
 });
 
-/// Converts the errors of the writers of `io`, which all have a variant for a file that was not
-/// written.
-macro_rules! from_writers {
-    ($($error:ident),*) => {$(
-        impl From<$error> for FileError {
-            fn from(error: $error) -> Self {
-                match error {
-                    $error::NotWritten(error) => error.into(),
-                    other => Self::Write(other.into()),
-                }
-            }
+impl From<RasterError> for FileError {
+    fn from(error: RasterError) -> Self {
+        match error {
+            RasterError::NotWritten(error) => error.into(),
+            other => Self::Write(other.into()),
         }
-    )*};
+    }
 }
 
-from_writers!(RasterError, NpyError, ColmapError, SplatPlyError);
+impl From<FormatError> for FileError {
+    fn from(error: FormatError) -> Self {
+        match error.kind() {
+            Kind::OutputExists => Self::Exists { path: error.path().to_owned() },
+            _ => Self::Write(error.into()),
+        }
+    }
+}
 
 impl From<SaveError> for FileError {
     fn from(error: SaveError) -> Self {

@@ -66,11 +66,7 @@ from_failures!(MapSurfaceError);
 ///
 /// # Errors
 /// [`JobError`] if the raster cannot be read or does not lie on a projected map in metres.
-pub fn read(
-    path: &Path,
-    stated: Option<VerticalDatum>,
-    progress: &dyn Progress,
-) -> Result<MapSurface, JobError> {
+pub fn read(path: &Path, stated: Option<VerticalDatum>, progress: &dyn Progress) -> Result<MapSurface, JobError> {
     let path = &surface_file(path);
     let mut dem = read_dem(path)?;
     let definition = dem.horizontal_epsg.map(|code| format!("EPSG:{code}")).or_else(|| dem.crs_wkt.clone());

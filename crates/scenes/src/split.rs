@@ -4,7 +4,8 @@
 use std::path::PathBuf;
 
 use colmap::split::{ChosenView, SplitConfig, SplitError, points_of_views, split};
-use io::colmap::{ColmapError, ColmapModel, ColmapPoint};
+use io::FormatError;
+use io::colmap::{ColmapModel, ColmapPoint};
 use serde::{Deserialize, Serialize};
 
 use job::error::{JobError, from_steps, job_errors};
@@ -62,9 +63,6 @@ pub struct SplitImage {
 /// A split that could not be made.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum SplitJobError {
-    /// The model cannot be read.
-    #[error(transparent)]
-    Model(#[from] ColmapError),
     /// No image has the name of the first context.
     #[error("no image of the COLMAP model has the name '{name}': expected a name of its list of images")]
     UnknownImage {
@@ -88,13 +86,12 @@ pub(crate) enum SplitJobError {
 }
 
 failures!(SplitJobError: Other {
-    Self::Model(error) => error.kind(),
     Self::Job(error) => error.kind(),
 });
 
 job_errors!(SplitJobError);
 
-from_steps!(SplitJobError: Job(FileError, Cancelled));
+from_steps!(SplitJobError: Job(FileError, Cancelled, FormatError));
 
 impl SplitJobReport {
     /// Returns the report as text, which ends in a line break.

@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
+use io::FormatError;
 use io::areas::AreaError;
 use io::raster::RasterError;
-use io::splat_ply::SplatPlyError;
 use numeric::{Kind, failures};
 
 use job::error::{JobError, SettingError, from_steps, job_errors};
@@ -32,9 +32,6 @@ pub(crate) enum ViewError {
         /// The folder.
         path: PathBuf,
     },
-    /// Splats cannot be read.
-    #[error(transparent)]
-    Splats(#[from] SplatPlyError),
     /// A file of splats or a mesh is too large for a browser.
     #[error(
         "found {found} {what}, a browser can show {most}: make a smaller file (a budget of a training, a coarser mesh): {}",
@@ -104,10 +101,9 @@ failures!(ViewError: Other {
     Self::Mesh { .. } => Kind::File,
     Self::Raster(error) => error.kind(),
     Self::Vectors(error) => error.kind(),
-    Self::Splats(error) => error.kind(),
     Self::Job(error) => error.kind(),
 });
 
 job_errors!(ViewError { Self::Port { .. } => Some("the port") });
 
-from_steps!(ViewError: Job(SettingError));
+from_steps!(ViewError: Job(SettingError, FormatError));

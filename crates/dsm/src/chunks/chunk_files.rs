@@ -114,7 +114,7 @@ impl ChunkResult {
     }
 }
 
-fn write_rasters(folder: &Path, rasters: &ChunkRasters) -> Result<(), io::npy::NpyError> {
+fn write_rasters(folder: &Path, rasters: &ChunkRasters) -> Result<(), io::FormatError> {
     let shape = [rasters.height_m.height(), rasters.height_m.width()];
     for (name, grid) in
         [("height.npy", &rasters.height_m), ("sigma.npy", &rasters.sigma_m), ("confidence.npy", &rasters.confidence)]

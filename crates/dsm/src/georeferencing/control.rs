@@ -57,7 +57,7 @@ impl GroundControl {
     pub(crate) fn read(path: Option<&Path>, images: &[SceneImage], notes: &mut Notes<'_>) -> Result<Self, DsmError> {
         let Some(path) = path else { return Ok(Self::default()) };
         let mut out = Self { path: path.to_owned(), ..Self::default() };
-        for point in read_ground_points(path)? {
+        for point in read_ground_points(path).map_err(DsmError::Control)? {
             let mut seen = places(&point, images)?;
             if seen.is_empty() && point.chip.is_none() {
                 continue;

@@ -61,7 +61,13 @@ pub fn files_of(config: &DsmConfig) -> Result<BTreeSet<PathBuf>, DsmError> {
     }
     files.extend(config.images.iter().flat_map(|image| io::rpc::side_files(image)));
     for points in config.control.iter().filter(|path| path.is_file()) {
-        files.extend(read_ground_points(points)?.into_iter().filter_map(|point| point.chip).map(|chip| chip.path));
+        files.extend(
+            read_ground_points(points)
+                .map_err(DsmError::Control)?
+                .into_iter()
+                .filter_map(|point| point.chip)
+                .map(|chip| chip.path),
+        );
     }
     files.retain(|path| path.is_file());
     Ok(files)

@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use super::error::ColmapError;
 use crate::camera_file::{Fault, read_bytes};
+use crate::format_error::FormatError;
 
 /// Largest file that is read, bytes. `images` is the largest one, because it lists every
 /// observation.
@@ -15,14 +15,18 @@ pub(super) fn load<T>(
     name: &'static str,
     from_binary: impl Fn(&[u8]) -> Result<Vec<T>, Fault>,
     from_text: impl Fn(&str) -> Result<Vec<T>, Fault>,
-) -> Result<(PathBuf, Vec<T>), ColmapError> {
+) -> Result<(PathBuf, Vec<T>), FormatError> {
     let [binary, text] = ["bin", "txt"].map(|extension| folder.join(format!("{name}.{extension}")));
     let path = [&binary, &text].into_iter().find(|path| path.is_file());
-    let path = path.ok_or_else(|| ColmapError::Missing { folder: folder.to_owned(), name })?.clone();
+    let missing = || {
+        let what = format!("the folder holds neither {name}.bin nor {name}.txt");
+        FormatError::new(folder, what + ", choose the folder that holds the COLMAP model")
+    };
+    let path = path.ok_or_else(missing)?.clone();
     let bytes = read_bytes(&path, SIZE_LIMIT)?;
     let parsed = if path == binary { from_binary(&bytes) } else { from_text(&String::from_utf8_lossy(&bytes)) };
     match parsed {
         Ok(parsed) => Ok((path, parsed)),
-        Err(fault) => Err(fault.at(&path).into()),
+        Err(fault) => Err(fault.at(&path)),
     }
 }

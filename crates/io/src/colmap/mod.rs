@@ -16,7 +16,6 @@
 
 mod binary;
 mod convention;
-mod error;
 mod files;
 mod model;
 mod points;
@@ -25,7 +24,6 @@ mod read;
 mod text;
 mod write;
 
-pub use error::ColmapError;
 pub use model::{ColmapModel, ColmapObservation, ColmapPoint, ColmapView};
 pub use points::read_with_points;
 pub use read::read;

@@ -4,20 +4,20 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use super::convention::pixel_from_colmap;
-use super::error::ColmapError;
 use super::files::load;
 use super::model::{ColmapModel, ColmapObservation, ColmapPoint};
 use super::raw::{ImagePoints, RawObservation, RawPoint};
 use super::read::read_views;
 use super::{binary, text};
 use crate::camera_file::Fault;
+use crate::format_error::FormatError;
 
 /// Reads the model in a folder with its points.
 ///
 /// # Errors
-/// The errors of [`read`](super::read), for `points3D` too; [`ColmapError::File`] when a
-/// position is not finite, or a track names an image or an image point that does not exist.
-pub fn read_with_points(folder: &Path) -> Result<(ColmapModel, Vec<ColmapPoint>), ColmapError> {
+/// The errors of [`read`](super::read), for `points3D` too; [`FormatError`] also when a position is
+/// not finite, or a track names an image or an image point that does not exist.
+pub fn read_with_points(folder: &Path) -> Result<(ColmapModel, Vec<ColmapPoint>), FormatError> {
     let (model, pixels) = read_views(folder, ImagePoints::Keep)?;
     let view_of: HashMap<u32, usize> = model.views.iter().enumerate().map(|(index, view)| (view.id, index)).collect();
     let (path, points) = load(folder, "points3D", binary::points, text::points)?;

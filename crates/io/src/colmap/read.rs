@@ -6,20 +6,19 @@ use std::path::Path;
 use camera::{Lens, LensError, Pose};
 
 use super::convention::{PIXEL_SHIFT, is_inside, principal_point_index, shorten};
-use super::error::ColmapError;
 use super::files::load;
 use super::model::{ColmapModel, ColmapView};
 use super::raw::{ImagePoints, RawCamera, RawImage};
 use super::{binary, text};
 use crate::camera_file::Fault;
+use crate::format_error::FormatError;
 
 /// Reads the lenses and poses of the model in a folder.
 ///
 /// # Errors
-/// - [`ColmapError::Missing`] when `cameras` or `images` is not there.
-/// - [`ColmapError::File`] when the system cannot read a file, or a file breaks its format, a lens
-///   is impossible, an image has no camera or no finite pose, an image name leads out of its
-///   folder, or an identifier occurs twice.
+/// [`FormatError`] when `cameras` or `images` is not there, the system cannot read a file, a file
+/// breaks its format, a lens is impossible, an image has no camera or no finite pose, an image name
+/// leads out of its folder, or an identifier occurs twice.
 ///
 /// # Examples
 /// ```
@@ -33,7 +32,7 @@ use crate::camera_file::Fault;
 /// assert_eq!(model.lenses[0].principal_point().sample, 319.5);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn read(folder: &Path) -> Result<ColmapModel, ColmapError> {
+pub fn read(folder: &Path) -> Result<ColmapModel, FormatError> {
     Ok(read_views(folder, ImagePoints::Skip)?.0)
 }
 
@@ -41,7 +40,7 @@ pub fn read(folder: &Path) -> Result<ColmapModel, ColmapError> {
 pub(super) type ViewPixels = Vec<[f64; 2]>;
 
 /// Reads the model, and the pixels of the points of each view.
-pub(super) fn read_views(folder: &Path, keep: ImagePoints) -> Result<(ColmapModel, Vec<ViewPixels>), ColmapError> {
+pub(super) fn read_views(folder: &Path, keep: ImagePoints) -> Result<(ColmapModel, Vec<ViewPixels>), FormatError> {
     let (cameras_path, cameras) = load(folder, "cameras", binary::cameras, text::cameras)?;
     let images = |bytes: &[u8]| binary::images(bytes, keep);
     let (images_path, images) = load(folder, "images", images, |text| text::images(text, keep))?;
@@ -49,7 +48,7 @@ pub(super) fn read_views(folder: &Path, keep: ImagePoints) -> Result<(ColmapMode
     for camera in cameras {
         let fault = |what: String| Fault { what, place: camera.place.clone() }.at(&cameras_path);
         if lens_of.insert(camera.id, lenses.len()).is_some() {
-            return Err(fault(format!("camera {} occurs a second time", camera.id)).into());
+            return Err(fault(format!("camera {} occurs a second time", camera.id)));
         }
         lenses.push(lens(&camera).map_err(|error| fault(error.to_string()))?);
     }
@@ -58,7 +57,7 @@ pub(super) fn read_views(folder: &Path, keep: ImagePoints) -> Result<(ColmapMode
     for mut image in images {
         if !seen.insert(image.id) {
             let what = format!("image {} occurs a second time", image.id);
-            return Err(Fault { what, place: image.place }.at(&images_path).into());
+            return Err(Fault { what, place: image.place }.at(&images_path));
         }
         points.push(std::mem::take(&mut image.points));
         views.push(view(image, &lens_of).map_err(|fault| fault.at(&images_path))?);

@@ -1,7 +1,7 @@
 //! Reads valid, broken and hostile COLMAP models in text and binary.
 
 use super::*;
-use crate::camera_file::CameraFileError;
+use crate::format_error::FormatError;
 
 const CAMERAS: &str = "# comment\n7 PINHOLE 640 480 500 510 320 240\n9 SIMPLE_RADIAL 64 48 50 32 24 0.1\n";
 const IMAGES: &str = "# comment\n\n1 1 0 0 0 1 2 3 7 a b.png\n1.0 2.0 -1\n\
@@ -15,7 +15,7 @@ fn folder(files: &[(&str, &[u8])]) -> tempfile::TempDir {
     folder
 }
 
-fn read_text(cameras: &str, images: &str) -> Result<ColmapModel, ColmapError> {
+fn read_text(cameras: &str, images: &str) -> Result<ColmapModel, FormatError> {
     read(folder(&[("cameras.txt", cameras.as_bytes()), ("images.txt", images.as_bytes())]).path())
 }
 
@@ -47,18 +47,15 @@ fn binary_model() -> (Vec<u8>, Vec<u8>) {
     (cameras, images)
 }
 
-fn read_binary(cameras: &[u8], images: &[u8]) -> Result<ColmapModel, ColmapError> {
+fn read_binary(cameras: &[u8], images: &[u8]) -> Result<ColmapModel, FormatError> {
     read(folder(&[("cameras.bin", cameras), ("images.bin", images)]).path())
 }
 
 #[track_caller]
-fn refused(result: Result<ColmapModel, ColmapError>, words: &str, place: &str) {
-    match result {
-        Err(ColmapError::File(CameraFileError::Invalid { what, place: found, .. })) => {
-            assert!(what.contains(words) && found == place, "{what} ({found})");
-        }
-        other => panic!("{other:?}"),
-    }
+fn refused(result: Result<ColmapModel, FormatError>, words: &str, place: &str) {
+    let error = result.unwrap_err();
+    let (text, path) = (error.to_string(), error.path().display().to_string());
+    assert!(text.contains(words) && text.ends_with(&format!(" ({place}): {path}")), "{text}");
 }
 
 #[test]
@@ -121,8 +118,14 @@ fn broken_binaries_are_refused_with_their_byte() {
 #[test]
 fn a_folder_without_a_model() {
     let folder = folder(&[("cameras.txt", b"")]);
-    assert!(matches!(read(folder.path()), Err(ColmapError::Missing { name: "images", .. })));
-    assert!(matches!(read(&folder.path().join("none")), Err(ColmapError::Missing { name: "cameras", .. })));
+    for (folder, name) in [(folder.path().to_owned(), "images"), (folder.path().join("none"), "cameras")] {
+        let error = read(&folder).unwrap_err();
+        assert_eq!(error.path(), folder);
+        assert!(
+            error.to_string().starts_with(&format!("the folder holds neither {name}.bin nor {name}.txt, ")),
+            "{error}"
+        );
+    }
 }
 
 #[test]

@@ -1,10 +1,10 @@
 //! Writes models in both encodings and reads them back; refuses models that no file can hold.
 
 use camera::{ImagePoint, Lens, LensModel, Pose};
+use numeric::{Failure, Kind};
 use proptest::prelude::*;
 
 use super::*;
-use crate::atomic::SaveError;
 
 fn observation(view: u32, sample: f64, line: f64) -> ColmapObservation {
     ColmapObservation { view, pixel: ImagePoint { sample, line } }
@@ -46,8 +46,8 @@ fn both_encodings_lead_back() {
         write(folder.path(), &model, &points, encoding, false).unwrap();
         assert_eq!(read(folder.path()).unwrap(), read_with_points(folder.path()).unwrap().0);
         found.push(read_with_points(folder.path()).unwrap());
-        let again = write(folder.path(), &model, &points, encoding, false);
-        assert!(matches!(again, Err(ColmapError::NotWritten(SaveError::Exists { .. }))), "{again:?}");
+        let again = write(folder.path(), &model, &points, encoding, false).unwrap_err();
+        assert_eq!(again.kind(), Kind::OutputExists, "{again}");
         write(folder.path(), &model, &points, encoding, true).unwrap();
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 3);
     }
@@ -90,10 +90,9 @@ fn models_that_no_file_can_hold_are_refused() {
         let (mut model, mut points) = model();
         change(&mut model, &mut points);
         let folder = tempfile::tempdir().unwrap();
-        match write(folder.path(), &model, &points, ColmapEncoding::Binary, false) {
-            Err(ColmapError::Inconsistent { what, .. }) => assert!(what.contains(words), "{what}"),
-            other => panic!("{other:?}"),
-        }
+        let error = write(folder.path(), &model, &points, ColmapEncoding::Binary, false).unwrap_err();
+        let text = error.to_string();
+        assert!(text.starts_with("the model cannot be written (") && text.contains(words), "{text}");
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
     }
     refused(|model, _| model.views[1].lens = 3, "names lens 3, the model has 3 lenses");
@@ -107,8 +106,8 @@ fn models_that_no_file_can_hold_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("frames.bin"), b"").unwrap();
     let (model, points) = model();
-    let result = write(folder.path(), &model, &points, ColmapEncoding::Text, true);
-    assert!(matches!(result, Err(ColmapError::Inconsistent { .. })), "{result:?}");
+    let error = write(folder.path(), &model, &points, ColmapEncoding::Text, true).unwrap_err();
+    assert!(error.to_string().contains("the folder holds frames.bin of another model"), "{error}");
 }
 
 #[test]

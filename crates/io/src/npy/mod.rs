@@ -8,11 +8,10 @@
 mod data;
 mod header;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use numeric::failures;
-
-use crate::atomic::{SaveError, write_stream};
+use crate::atomic::write_stream;
+use crate::format_error::FormatError;
 use crate::regular::read_regular;
 
 pub use data::{NpyArray, NpyData, NpyNumber};
@@ -21,43 +20,6 @@ pub use data::{NpyArray, NpyData, NpyNumber};
 const SIZE_LIMIT: u64 = 8 << 30;
 /// Numbers converted to bytes at a time.
 const CHUNK: usize = 1 << 14;
-
-/// An array that was not read or written.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum NpyError {
-    /// The file cannot be read.
-    #[error("cannot read the file ({source}): {}", .path.display())]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// The error of the system.
-        source: std::io::Error,
-    },
-    /// The content is not an array of a supported type.
-    #[error("not a NumPy array that can be read ({what}): {}", .path.display())]
-    Invalid {
-        /// The file.
-        path: PathBuf,
-        /// The content found and the content expected.
-        what: String,
-    },
-    /// The shape does not have the number of values given.
-    #[error("found {numbers} numbers for the shape {shape:?}, expected its product: {}", .path.display())]
-    Shape {
-        /// The file.
-        path: PathBuf,
-        /// The shape.
-        shape: Vec<usize>,
-        /// Number of values.
-        numbers: usize,
-    },
-    /// The file was not written.
-    #[error(transparent)]
-    NotWritten(#[from] SaveError),
-}
-
-failures!(NpyError: File { Self::NotWritten(error) => error.kind() });
 
 /// Writes numbers in C order. `shape` has the lengths of the axes, the slowest first.
 ///
@@ -75,18 +37,19 @@ failures!(NpyError: File { Self::NotWritten(error) => error.kind() });
 /// ```
 ///
 /// # Errors
-/// [`NpyError::Shape`] when the product of `shape` is not the number of values;
-/// [`NpyError::NotWritten`] for a file that exists without `overwrite`, and when the system
-/// refuses.
+/// [`FormatError`] when the product of `shape` is not the number of values, for a file that exists
+/// without `overwrite`, and when the system refuses.
 pub fn write<T: NpyNumber>(
     path: impl AsRef<Path>,
     shape: &[usize],
     numbers: &[T],
     overwrite: bool,
-) -> Result<(), NpyError> {
+) -> Result<(), FormatError> {
     let path = path.as_ref();
     if product(shape) != Some(numbers.len()) {
-        return Err(NpyError::Shape { path: path.to_owned(), shape: shape.to_vec(), numbers: numbers.len() });
+        let found = numbers.len();
+        let what = format!("found {found} numbers for the shape {shape:?}, expected its product");
+        return Err(FormatError::new(path, what));
     }
     let header = header::encode(T::DESCRIPTION, shape);
     Ok(write_stream(path, overwrite, |out| {
@@ -104,14 +67,13 @@ pub fn write<T: NpyNumber>(
 /// Reads an array.
 ///
 /// # Errors
-/// [`NpyError::Unreadable`] when the system refuses; [`NpyError::Invalid`] for a file that is not
-/// an array file, ends early, continues after its numbers, or has another type or order than can be
-/// read.
-pub fn read(path: impl AsRef<Path>) -> Result<NpyArray, NpyError> {
+/// [`FormatError`] when the system refuses, for a file that is not an array file, ends early,
+/// continues after its numbers, or has another type or order than can be read.
+pub fn read(path: impl AsRef<Path>) -> Result<NpyArray, FormatError> {
     let path = path.as_ref();
-    let unreadable = |source| NpyError::Unreadable { path: path.to_owned(), source };
+    let unreadable = |source| FormatError::unreadable(path, "the file", source);
     let size = std::fs::metadata(path).map_err(unreadable)?.len();
-    let invalid = |what: String| NpyError::Invalid { path: path.to_owned(), what };
+    let invalid = |what: String| FormatError::new(path, format_args!("not a NumPy array that can be read ({what})"));
     if size > SIZE_LIMIT {
         return Err(invalid(format!("it has {size} bytes, expected at most {SIZE_LIMIT}")));
     }

@@ -1,5 +1,6 @@
 //! Reads a cloud, as points or as a grid.
 
+use std::fmt;
 use std::io::{BufReader, Seek};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
@@ -7,10 +8,12 @@ use std::path::{Path, PathBuf};
 use crs::VerticalDatum;
 use geodesy::MapPoint;
 use las::{Header, PointDataBuilder, Reader};
+use numeric::Failure;
 use raster::{GeoTransform, Grid};
 
 use super::crs::{Stated, stated};
-use super::{PointsError, preflight};
+use super::preflight;
+use crate::format_error::FormatError;
 use crate::raster::{Dem, Provenance};
 use crate::regular;
 
@@ -91,23 +94,26 @@ impl PointCloud {
     /// Opens a file and reads its header.
     ///
     /// # Errors
-    /// - [`PointsError::Unreadable`] when the system cannot read the file.
-    /// - [`PointsError::Damaged`] when the file is not LAS or LAZ, or its header does not fit its
-    ///   length.
-    /// - [`PointsError::Crs`] when PROJ cannot read the reference system.
-    pub fn open(path: impl AsRef<Path>) -> Result<Self, PointsError> {
+    /// [`FormatError`] when the system cannot read the file, the file is not LAS or LAZ, its header
+    /// does not fit its length, or PROJ cannot read the reference system.
+    pub fn open(path: impl AsRef<Path>) -> Result<Self, FormatError> {
         let path = path.as_ref().to_owned();
-        let unreadable = |source| PointsError::Unreadable { path: path.clone(), source };
+        let unreadable = |source: std::io::Error| {
+            let what = format!("cannot read the file ({source}), check its name and permissions");
+            FormatError::because(&path, what, source)
+        };
         let file = regular::open(&path).map_err(unreadable)?;
         let length = file.metadata().map_err(unreadable)?.len();
         let mut file = BufReader::new(file);
-        let damaged = |reason| PointsError::damaged(&path, reason);
-        preflight::check(&mut file, length).map_err(damaged)?;
+        preflight::check(&mut file, length).map_err(|reason| damaged(&path, reason))?;
         let header = guarded(&path, || Header::new(&mut file))?;
         guarded(&path, || preflight::check_chunks(&mut file, &header, length))?;
         file.rewind().map_err(unreadable)?;
         let reader = guarded(&path, || Reader::new(file))?;
-        let stated = stated(reader.header()).map_err(|source| PointsError::Crs { path: path.clone(), source })?;
+        let stated = stated(reader.header()).map_err(|source| {
+            let (what, kind) = (format!("the coordinate reference system cannot be read ({source})"), source.kind());
+            FormatError::because(&path, what, source).of_kind(kind)
+        })?;
         Ok(Self { path, reader, stated })
     }
 
@@ -135,9 +141,8 @@ impl PointCloud {
     /// Reads all points except noise and withheld ones: x and y in map units, heights in metres.
     ///
     /// # Errors
-    /// - [`PointsError::TooManyPoints`] when the file announces more than `most` points.
-    /// - [`PointsError::Damaged`] when the points cannot be decoded.
-    /// - [`PointsError::NoPoints`] when no point is left.
+    /// [`FormatError`] when the file announces more than `most` points, the points cannot be
+    /// decoded, or no point is left.
     ///
     /// # Examples
     /// ```no_run
@@ -146,12 +151,13 @@ impl PointCloud {
     /// let cloud = PointCloud::open("lidar.laz")?;
     /// println!("{:?}", cloud.horizontal_epsg());
     /// let points = cloud.positions(10_000_000)?;
-    /// # Ok::<(), io::points::PointsError>(())
+    /// # Ok::<(), io::FormatError>(())
     /// ```
-    pub fn positions(mut self, most: u64) -> Result<Vec<[f64; 3]>, PointsError> {
+    pub fn positions(mut self, most: u64) -> Result<Vec<[f64; 3]>, FormatError> {
         let announced = self.reader.header().number_of_points();
         if announced > most {
-            return Err(PointsError::TooManyPoints { path: self.path, points: announced, most });
+            let what = format!("the cloud has {announced} points, at most {most} are read, thin it or cut it");
+            return Err(FormatError::new(&self.path, what));
         }
         let mut found = Vec::new();
         let PointCounts { read: points, .. } = self.each(|point| {
@@ -159,16 +165,15 @@ impl PointCloud {
                 found.push([point.x, point.y, point.height_m]);
             }
         })?;
-        if found.is_empty() { Err(PointsError::NoPoints { path: self.path, points }) } else { Ok(found) }
+        if found.is_empty() { Err(no_points(&self.path, points)) } else { Ok(found) }
     }
 
     /// Makes a grid with the highest point of every cell of a lattice.
     ///
     /// # Errors
-    /// - [`PointsError::TooManyCells`] when the extent has too many cells for the number of points.
-    /// - [`PointsError::Damaged`] when the extent is invalid or the points cannot be decoded.
-    /// - [`PointsError::NoPoints`] when no point is left.
-    pub fn highest(mut self, lattice: CellLattice) -> Result<GriddedPoints, PointsError> {
+    /// [`FormatError`] when the extent is invalid or has too many cells for the number of points,
+    /// the points cannot be decoded, or no point is left.
+    pub fn highest(mut self, lattice: CellLattice) -> Result<GriddedPoints, FormatError> {
         let (geotransform, width, height) = self.grid(lattice)?;
         let mut heights = Grid::filled(width, height, f32::NAN);
         let mut classes = Grid::filled(width, height, None);
@@ -187,7 +192,7 @@ impl PointCloud {
         })?;
         let left_out = unusable + outside;
         if points == left_out {
-            return Err(PointsError::NoPoints { path: self.path, points });
+            return Err(no_points(&self.path, points));
         }
         let dem = Dem {
             path: self.path,
@@ -212,12 +217,12 @@ impl PointCloud {
     /// Passes each point of the surface to `take`, in the order of the file.
     ///
     /// # Errors
-    /// [`PointsError::Damaged`] when the points cannot be decoded.
-    pub fn visit(mut self, take: impl FnMut(SurfacePoint)) -> Result<PointCounts, PointsError> {
+    /// [`FormatError`] when the points cannot be decoded.
+    pub fn visit(mut self, take: impl FnMut(SurfacePoint)) -> Result<PointCounts, FormatError> {
         self.each(take)
     }
 
-    fn each(&mut self, mut take: impl FnMut(SurfacePoint)) -> Result<PointCounts, PointsError> {
+    fn each(&mut self, mut take: impl FnMut(SurfacePoint)) -> Result<PointCounts, FormatError> {
         let mut batch = PointDataBuilder::new().for_header(self.reader.header()).build();
         let at_once = (BATCH_BYTES / u64::from(self.reader.header().point_format().len().max(1))).min(BATCH);
         let mut counts = PointCounts { read: 0, left_out: 0 };
@@ -227,7 +232,7 @@ impl PointCloud {
                 return Ok(counts);
             }
             for point in batch.points() {
-                let point = point.map_err(|error| PointsError::damaged(&self.path, error))?;
+                let point = point.map_err(|error| damaged(&self.path, error))?;
                 counts.read += 1;
                 let class = u8::from(point.classification);
                 if point.is_withheld || NOISE.contains(&class) || !point.z.is_finite() {
@@ -242,12 +247,12 @@ impl PointCloud {
 
     /// Returns the geotransform, the width and the height of the grid that covers the extent in the
     /// header.
-    fn grid(&self, lattice: CellLattice) -> Result<(GeoTransform, usize, usize), PointsError> {
+    fn grid(&self, lattice: CellLattice) -> Result<(GeoTransform, usize, usize), FormatError> {
         let (bounds, points) = (self.reader.header().bounds(), self.reader.header().number_of_points());
         let extent = [bounds.min.x, bounds.min.y, bounds.max.x, bounds.max.y];
         let ordered = bounds.min.x <= bounds.max.x && bounds.min.y <= bounds.max.y;
         if !(ordered && extent.iter().all(|v| v.is_finite() && v.abs() < 1e12)) {
-            return Err(PointsError::damaged(
+            return Err(damaged(
                 &self.path,
                 format!("the extent in the header is {extent:?}, expected finite numbers in ascending order"),
             ));
@@ -259,7 +264,13 @@ impl PointCloud {
         let rows = ((top - bounds.min.y) / cell_y).floor() + 1.0;
         let (cells, most) = (columns * rows, points.saturating_mul(CELLS_PER_POINT).clamp(CELLS_ALWAYS, CELLS_MAX));
         if !(cells.is_finite() && cells > 0.0 && cells <= most as f64) {
-            return Err(PointsError::TooManyCells { path: self.path.clone(), cells, cell: cell_x, points, most });
+            return Err(FormatError::new(
+                &self.path,
+                format_args!(
+                    "the extent of the cloud has {cells:.0} cells of {cell_x} map units for {points} points, the limit \
+                     is {most} cells, use larger cells"
+                ),
+            ));
         }
         Ok((GeoTransform([left, cell_x, 0.0, top, 0.0, -cell_y]), columns as usize, rows as usize))
     }
@@ -275,12 +286,23 @@ fn place(geotransform: &GeoTransform, x: f64, y: f64) -> Option<(usize, usize)> 
     Some((whole(column)?, whole(row)?))
 }
 
+/// The error of a file that is damaged, truncated, or of a kind that is not supported.
+fn damaged(path: &Path, reason: impl fmt::Display) -> FormatError {
+    FormatError::new(path, format_args!("the file is not a readable LAS or LAZ file ({reason})"))
+}
+
+/// The error of a cloud of which no point is left.
+fn no_points(path: &Path, points: u64) -> FormatError {
+    let what = format!("none of the {points} points can be used (noise and withheld points do not count)");
+    FormatError::new(path, what)
+}
+
 /// Runs the decoder. It uses numbers of the file as indices without checks, so a panic means that
 /// the file is damaged.
-fn guarded<T, E: ToString>(path: &Path, decode: impl FnOnce() -> Result<T, E>) -> Result<T, PointsError> {
+fn guarded<T, E: fmt::Display>(path: &Path, decode: impl FnOnce() -> Result<T, E>) -> Result<T, FormatError> {
     match catch_unwind(AssertUnwindSafe(decode)) {
         Ok(Ok(value)) => Ok(value),
-        Ok(Err(error)) => Err(PointsError::damaged(path, error)),
-        Err(_) => Err(PointsError::damaged(path, "the points cannot be decoded")),
+        Ok(Err(error)) => Err(damaged(path, error)),
+        Err(_) => Err(damaged(path, "the points cannot be decoded")),
     }
 }

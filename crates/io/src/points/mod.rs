@@ -12,7 +12,6 @@
 mod cloud;
 mod cloud_file;
 mod crs;
-mod error;
 mod export;
 mod las_header;
 mod preflight;
@@ -22,6 +21,5 @@ mod surface_cloud_tests;
 
 pub use cloud::{CellLattice, GriddedPoints, PointCloud, PointCounts, SurfacePoint, is_point_cloud};
 pub use cloud_file::{CloudFormat, write_cloud};
-pub use error::PointsError;
 pub use export::write_las;
 pub use surface_cloud::{CloudExtent, SurfaceCloud};

@@ -6,7 +6,6 @@ use numeric::{Kind, failures};
 
 use super::read::luma_rule::BandChoice;
 use crate::atomic::SaveError;
-use crate::stac::StacError;
 
 /// A raster file that cannot be read or written. The text ends with the path, and `reason` is
 /// GDAL's message.
@@ -55,7 +54,7 @@ pub enum RasterError {
         /// The item.
         path: PathBuf,
         /// What is wrong with it.
-        source: StacError,
+        source: Box<dyn std::error::Error + Send + Sync>,
     },
     /// GDAL opened the file but cannot decode its content.
     #[error("the raster is damaged or truncated ({reason}): {}", path.display())]

@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 use numeric::failures;
 
 use super::format::RpcFormat;
-use crate::atomic::SaveError;
 
 /// A defect in the content of an RPC file, with the key and, in text formats, the number of the
 /// line from 1.
@@ -200,19 +199,13 @@ impl fmt::Display for Tried<'_> {
     }
 }
 
-/// An RPC that was not written.
+/// A format of RPCs that can be read but not written.
 #[derive(Debug, thiserror::Error)]
+#[error("the format {format} can only be read: choose text, RPB or JSON")]
 #[non_exhaustive]
-pub enum RpcWriteError {
-    /// The format can be read but not written.
-    #[error("the format {format} can only be read: choose text, RPB or JSON")]
-    Format {
-        /// The format asked for.
-        format: RpcFormat,
-    },
-    /// The file was not written.
-    #[error(transparent)]
-    NotWritten(#[from] SaveError),
+pub struct ReadOnlyFormat {
+    /// The format that was asked for.
+    pub format: RpcFormat,
 }
 
-failures!(RpcWriteError: File { Self::NotWritten(error) => error.kind() });
+failures!(ReadOnlyFormat: File);

@@ -34,7 +34,7 @@ mod tiff_tag;
 mod write;
 mod xml;
 
-pub use error::{Attempt, Fault, RpcReadError, RpcWriteError};
+pub use error::{Attempt, Fault, ReadOnlyFormat, RpcReadError};
 pub use file::TEXT_LIMIT;
 pub use format::RpcFormat;
 pub use read::{all_of_image, read, read_for_image};

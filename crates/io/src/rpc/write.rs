@@ -8,34 +8,35 @@ use std::path::Path;
 use camera::Rpc;
 use serde_json::{Map, Value};
 
-use super::error::RpcWriteError;
+use super::error::ReadOnlyFormat;
 use super::format::RpcFormat;
 use super::names::{POLYS, Poly, REQUIRED, RPC00B};
 use super::{json, rpb};
 use crate::atomic::write_bytes;
+use crate::format_error::FormatError;
 
 /// Writes `rpc` to `path` as [`RpcFormat::Text`], [`RpcFormat::Rpb`] or [`RpcFormat::Json`].
 ///
 /// The content is on the disk before the file gets its name.
 ///
 /// # Errors
-/// [`RpcWriteError::Format`] for another format; [`RpcWriteError::NotWritten`], also for a file
-/// that exists without `overwrite`.
-pub fn write(path: &Path, rpc: &Rpc, format: RpcFormat, overwrite: bool) -> Result<(), RpcWriteError> {
-    let text = to_text(rpc, format)?;
+/// [`FormatError`] for another format, for a file that exists without `overwrite`, and when the
+/// system refuses.
+pub fn write(path: &Path, rpc: &Rpc, format: RpcFormat, overwrite: bool) -> Result<(), FormatError> {
+    let text = to_text(rpc, format).map_err(|error| FormatError::of(path, error))?;
     Ok(write_bytes(path, text.as_bytes(), overwrite)?)
 }
 
 /// Returns the text of an RPC file.
 ///
 /// # Errors
-/// [`RpcWriteError::Format`] for a format other than text, RPB and JSON.
-pub fn to_text(rpc: &Rpc, format: RpcFormat) -> Result<String, RpcWriteError> {
+/// [`ReadOnlyFormat`] for a format other than text, RPB and JSON.
+pub fn to_text(rpc: &Rpc, format: RpcFormat) -> Result<String, ReadOnlyFormat> {
     match format {
         RpcFormat::Text => Ok(key_value(rpc)),
         RpcFormat::Rpb => Ok(rpb(rpc)),
         RpcFormat::Json => Ok(rpcm_json(rpc)),
-        format => Err(RpcWriteError::Format { format }),
+        format => Err(ReadOnlyFormat { format }),
     }
 }
 

@@ -22,8 +22,9 @@ mod spz;
 use std::path::Path;
 
 use crate::atomic::write_stream;
+use crate::format_error::FormatError;
 use crate::regular::read_regular;
-use crate::splat_ply::{self, LocalOrigin, SplatFile, SplatPlyError, checked, invalid};
+use crate::splat_ply::{self, LocalOrigin, SplatFile, checked};
 
 /// Largest file that is read, bytes.
 const SIZE_LIMIT: u64 = 16 << 30;
@@ -81,9 +82,8 @@ impl SplatFormat {
 /// Discs come back as discs: SOG says what they are, SPZ and glTF show it by third scales of 0.
 ///
 /// # Errors
-/// [`SplatPlyError::Unreadable`] when the system cannot read the file or its origin;
-/// [`SplatPlyError::Invalid`] for other content, a damaged file, a version that is not known, and
-/// splats that are not valid.
+/// [`FormatError`] when the system cannot read the file or its origin, for other content, a damaged
+/// file, a version that is not known, and splats that are not valid.
 ///
 /// # Examples
 /// ```
@@ -109,8 +109,8 @@ impl SplatFormat {
 /// assert!((back.splats[0].colour[0] - 0.8).abs() < 0.004);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn read(path: &Path) -> Result<SplatFile, SplatPlyError> {
-    let unreadable = |source| SplatPlyError::Unreadable { path: path.to_owned(), source };
+pub fn read(path: &Path) -> Result<SplatFile, FormatError> {
+    let unreadable = |source| FormatError::unreadable(path, "the file", source);
     let bytes = read_regular(path, SIZE_LIMIT).map_err(unreadable)?;
     let file = match SplatFormat::of_content(&bytes) {
         Some(SplatFormat::Spz) => spz::decode(&bytes),
@@ -118,9 +118,9 @@ pub fn read(path: &Path) -> Result<SplatFile, SplatPlyError> {
         Some(SplatFormat::Glb) => glb::decode(&bytes),
         Some(SplatFormat::Ply) | None => return splat_ply::read(path),
     };
-    let file = file.map_err(|what| invalid(path, what))?;
+    let file = file.map_err(|what| FormatError::new(path, what))?;
     for (index, splat) in file.splats.iter().enumerate() {
-        splat.validate().map_err(|defect| invalid(path, format!("splat {index}: {defect}")))?;
+        splat.validate().map_err(|defect| FormatError::new(path, format!("splat {index}: {defect}")))?;
     }
     Ok(SplatFile { origin: LocalOrigin::read_beside(path)?, ..file.flattened() })
 }
@@ -130,17 +130,20 @@ pub fn read(path: &Path) -> Result<SplatFile, SplatPlyError> {
 /// the format does not hold them ([`SplatFormat::holds_labels`]).
 ///
 /// # Errors
-/// - [`SplatPlyError::Invalid`] for another ending, a degree above 3, an origin that is not finite,
-///   and what the format cannot hold: SPZ positions beyond 8,000 km, glTF more than 4 GiB.
-/// - [`SplatPlyError::Splat`] when a splat is not valid.
-/// - [`SplatPlyError::NotWritten`] when a file exists and `overwrite` is false, or cannot be
-///   written.
+/// [`FormatError`]
+/// - for another ending, a degree above 3, an origin that is not finite, and what the format cannot
+///   hold: SPZ positions beyond 8,000 km, glTF more than 4 GiB;
+/// - when a splat is not valid;
+/// - when a file exists and `overwrite` is false, or cannot be written.
 ///
 /// # Panics
 /// If there are harmonics of fewer splats.
-pub fn write(path: &Path, file: &SplatFile, overwrite: bool) -> Result<(), SplatPlyError> {
+pub fn write(path: &Path, file: &SplatFile, overwrite: bool) -> Result<(), FormatError> {
     let format = SplatFormat::of_ending(path).ok_or_else(|| {
-        invalid(path, format!("the ending names no format of splats, expected one of {}", SplatFormat::endings()))
+        FormatError::new(
+            path,
+            format!("the ending names no format of splats, expected one of {}", SplatFormat::endings()),
+        )
     })?;
     let bytes = match format {
         SplatFormat::Ply => return splat_ply::write_file(path, file, overwrite),
@@ -149,7 +152,10 @@ pub fn write(path: &Path, file: &SplatFile, overwrite: bool) -> Result<(), Splat
             let is_finite =
                 |splat| (0..3).all(|c| file.harmonics.iter().all(|h| h.of(splat, c).iter().all(|v| v.is_finite())));
             if let Some(splat) = (0..file.splats.len()).find(|splat| !is_finite(*splat)) {
-                return Err(invalid(path, format!("splat {splat} cannot be written (a harmonic is not finite)")));
+                return Err(FormatError::new(
+                    path,
+                    format!("splat {splat} cannot be written (a harmonic is not finite)"),
+                ));
             }
             match format {
                 SplatFormat::Spz => spz::encode(file),
@@ -158,7 +164,7 @@ pub fn write(path: &Path, file: &SplatFile, overwrite: bool) -> Result<(), Splat
             }
         }
     };
-    let bytes = bytes.map_err(|what| invalid(path, what))?;
+    let bytes = bytes.map_err(|what| FormatError::new(path, what))?;
     // The splats are written last, so that a file of splats always has its origin.
     if let Some(origin) = &file.origin {
         origin.write_beside(path, overwrite)?;

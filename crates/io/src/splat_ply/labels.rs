@@ -13,8 +13,8 @@ use gaussian::SplatLabel;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
-use super::error::{SplatPlyError, invalid};
 use crate::atomic::write_bytes;
+use crate::format_error::FormatError;
 use crate::regular::read_regular_text;
 
 /// Largest table that is read, bytes: a hundred thousand objects with two kilobytes of attributes.
@@ -69,27 +69,26 @@ impl LabelTable {
     /// Writes the table beside a file, to [`objects_path`].
     ///
     /// # Errors
-    /// [`SplatPlyError::NotWritten`] when the file exists and `overwrite` is false, or cannot be
+    /// [`FormatError`] when the file exists and `overwrite` is false, or cannot be
     /// written.
-    pub fn write_beside(&self, file: &Path, overwrite: bool) -> Result<(), SplatPlyError> {
+    pub fn write_beside(&self, file: &Path, overwrite: bool) -> Result<(), FormatError> {
         let path = objects_path(file);
-        let text = serde_json::to_string_pretty(self).map_err(|error| invalid(&path, error.to_string()))?;
+        let text = serde_json::to_string_pretty(self).map_err(|error| FormatError::new(&path, error.to_string()))?;
         Ok(write_bytes(&path, (text + "\n").as_bytes(), overwrite)?)
     }
 
     /// Reads the table beside a file, or returns `None` when no such file exists.
     ///
     /// # Errors
-    /// [`SplatPlyError::Unreadable`] when the system cannot read the file,
-    /// [`SplatPlyError::Invalid`] when it is not a table.
-    pub fn read_beside(file: &Path) -> Result<Option<Self>, SplatPlyError> {
+    /// [`FormatError`] when the system cannot read the file, and when it is not a table.
+    pub fn read_beside(file: &Path) -> Result<Option<Self>, FormatError> {
         let path = objects_path(file);
         match read_regular_text(&path, SIZE_LIMIT) {
             Ok(text) => serde_json::from_str(&text).map(Some).map_err(|error| {
-                invalid(&path, format!("the file is not a table of objects as skysweep writes it ({error})"))
+                FormatError::new(&path, format!("the file is not a table of objects as skysweep writes it ({error})"))
             }),
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
-            Err(source) => Err(SplatPlyError::Unreadable { path, source }),
+            Err(source) => Err(FormatError::unreadable(&path, "the file", source)),
         }
     }
 }

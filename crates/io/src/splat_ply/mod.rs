@@ -21,21 +21,18 @@
 //!
 //! The number of splats is checked against the length of the file before anything is allocated.
 
-mod error;
 mod labels;
 mod layout;
 mod origin;
 mod read;
 mod write;
 
-pub use error::SplatPlyError;
 pub use labels::{LabelTable, LabelledObject, SplatLabels, objects_path};
 pub use layout::{SH_DEGREE_MAX, SplatForm, SplatLayout};
 pub use origin::{LocalOrigin, origin_path};
 pub use read::{SplatFile, read};
 pub use write::{write, write_file};
 
-pub(crate) use error::invalid;
 pub(crate) use layout::SH_C0;
 pub(crate) use write::checked;
 

@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::error::{SplatPlyError, invalid};
 use crate::atomic::write_bytes;
+use crate::format_error::FormatError;
 use crate::regular::read_regular_text;
 
 /// Point of a map that local positions are relative to.
@@ -47,39 +47,38 @@ impl LocalOrigin {
     ///
     /// # Errors
     /// The errors of [`Self::write`].
-    pub fn write_beside(&self, file: &Path, overwrite: bool) -> Result<(), SplatPlyError> {
+    pub fn write_beside(&self, file: &Path, overwrite: bool) -> Result<(), FormatError> {
         self.write(&origin_path(file), overwrite)
     }
 
     /// Writes the origin to a file.
     ///
     /// # Errors
-    /// [`SplatPlyError::Invalid`] when the origin is not finite, [`SplatPlyError::NotWritten`] when
-    /// the file exists and `overwrite` is false, or cannot be written.
-    pub fn write(&self, path: &Path, overwrite: bool) -> Result<(), SplatPlyError> {
+    /// [`FormatError`] when the origin is not finite, and when the file exists and `overwrite` is
+    /// false, or cannot be written.
+    pub fn write(&self, path: &Path, overwrite: bool) -> Result<(), FormatError> {
         if !self.origin.iter().all(|c| c.is_finite()) {
-            return Err(invalid(path, "the origin is not finite"));
+            return Err(FormatError::new(path, "the origin is not finite"));
         }
-        let text = serde_json::to_string_pretty(self).map_err(|error| invalid(path, error.to_string()))?;
+        let text = serde_json::to_string_pretty(self).map_err(|error| FormatError::new(path, error.to_string()))?;
         Ok(write_bytes(path, (text + "\n").as_bytes(), overwrite)?)
     }
 
     /// Reads the origin beside a file, or returns `None` when no such file exists.
     ///
     /// # Errors
-    /// [`SplatPlyError::Unreadable`] when the system cannot read the file,
-    /// [`SplatPlyError::Invalid`] when it is not an origin.
-    pub fn read_beside(file: &Path) -> Result<Option<Self>, SplatPlyError> {
+    /// [`FormatError`] when the system cannot read the file, and when it is not an origin.
+    pub fn read_beside(file: &Path) -> Result<Option<Self>, FormatError> {
         let path = origin_path(file);
         match read_regular_text(&path, 1 << 20) {
             Ok(text) => {
                 let origin: Self = serde_json::from_str(&text).map_err(|error| {
-                    invalid(&path, format!("the file is not an origin as skysweep writes it ({error})"))
+                    FormatError::new(&path, format!("the file is not an origin as skysweep writes it ({error})"))
                 })?;
                 Ok(Some(origin))
             }
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
-            Err(source) => Err(SplatPlyError::Unreadable { path, source }),
+            Err(source) => Err(FormatError::unreadable(&path, "the file", source)),
         }
     }
 }

@@ -6,10 +6,10 @@ use std::path::Path;
 
 use gaussian::{Splat, SplatHarmonics, SplatLabel};
 
-use super::error::{SplatPlyError, invalid};
 use super::labels::{LabelTable, SplatLabels};
 use super::layout::{SH_C0, SH_DEGREE_MAX, SplatForm, SplatLayout};
 use super::origin::LocalOrigin;
+use crate::format_error::FormatError;
 use crate::regular::read_regular;
 
 /// Largest file that is read, bytes.
@@ -87,10 +87,9 @@ struct Column {
 /// Reads the splats of a file, and the origin beside it.
 ///
 /// # Errors
-/// - [`SplatPlyError::Unreadable`] when the system cannot read the file or its origin.
-/// - [`SplatPlyError::Invalid`] when the file is not a little-endian binary PLY of Gaussians, is
-///   shorter than its header announces, holds a splat that fails [`Splat::validate`], or the origin
-///   beside it is broken.
+/// [`FormatError`] when the system cannot read the file or its origin, and when the file is not a
+/// little-endian binary PLY of Gaussians, is shorter than its header announces, holds a splat that
+/// fails [`Splat::validate`], or the origin beside it is broken.
 ///
 /// # Examples
 /// ```
@@ -114,23 +113,22 @@ struct Column {
 /// assert_eq!(file.origin, Some(origin));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn read(path: &Path) -> Result<SplatFile, SplatPlyError> {
-    let bytes =
-        read_regular(path, SIZE_LIMIT).map_err(|source| SplatPlyError::Unreadable { path: path.to_owned(), source })?;
-    let header = header(&bytes).map_err(|what| invalid(path, what))?;
+pub fn read(path: &Path) -> Result<SplatFile, FormatError> {
+    let bytes = read_regular(path, SIZE_LIMIT).map_err(|source| FormatError::unreadable(path, "the file", source))?;
+    let header = header(&bytes).map_err(|what| FormatError::new(path, what))?;
     let room = (bytes.len() - header.body) / header.row.max(1);
     if header.row == 0 || header.count > room as u64 {
         let what = format!("the header announces {} splats, the file has room for {room}", header.count);
-        return Err(invalid(path, what));
+        return Err(FormatError::new(path, what));
     }
-    let columns = Columns::of(&header).map_err(|what| invalid(path, what))?;
+    let columns = Columns::of(&header).map_err(|what| FormatError::new(path, what))?;
     let rows = bytes[header.body..].chunks_exact(header.row).take(header.count as usize);
     let mut splats = Vec::with_capacity(header.count as usize);
     let mut coefficients: Vec<f32> = Vec::new();
     let mut labels: Option<Vec<SplatLabel>> = columns.labels.map(|_| Vec::with_capacity(header.count as usize));
     for (index, row) in rows.enumerate() {
         let splat = columns.splat(row);
-        splat.validate().map_err(|defect| invalid(path, format!("splat {index}: {defect}")))?;
+        splat.validate().map_err(|defect| FormatError::new(path, format!("splat {index}: {defect}")))?;
         splats.push(splat);
         if let (Some(labels), Some(places)) = (&mut labels, columns.labels) {
             labels.push(label(row, places));
@@ -139,13 +137,13 @@ pub fn read(path: &Path) -> Result<SplatFile, SplatPlyError> {
     }
     if let Some(place) = coefficients.iter().position(|c| !c.is_finite()) {
         let what = format!("splat {}: a harmonic is not finite", place / columns.rest.len().max(1));
-        return Err(invalid(path, what));
+        return Err(FormatError::new(path, what));
     }
     // Trainers without harmonics pad files with zeros for loaders.
     let are_zero = coefficients.iter().all(|c| *c == 0.0);
     let harmonics = SplatHarmonics::new(columns.layout.sh_degree, coefficients).filter(|_| !are_zero);
     let table = || LabelTable::read_beside(path).map(Option::unwrap_or_default);
-    let labels = labels.map(|of| Ok::<_, SplatPlyError>(SplatLabels { of, table: table()? })).transpose()?;
+    let labels = labels.map(|of| Ok::<_, FormatError>(SplatLabels { of, table: table()? })).transpose()?;
     Ok(SplatFile { splats, harmonics, labels, layout: columns.layout, origin: LocalOrigin::read_beside(path)? })
 }
 

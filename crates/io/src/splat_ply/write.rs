@@ -5,27 +5,25 @@ use std::path::Path;
 
 use gaussian::{Splat, SplatHarmonics, SplatLabel};
 
-use super::error::{SplatPlyError, invalid};
 use super::layout::{SH_C0, SH_DEGREE_MAX, SplatLayout};
 use super::origin::LocalOrigin;
 use super::read::SplatFile;
 use crate::atomic::{refuse_existing, write_stream};
+use crate::format_error::FormatError;
 
 /// Writes splats, and their origin beside them. Harmonics beyond the constant one are 0.
 ///
 /// # Errors
-/// - [`SplatPlyError::Invalid`] when the degree of the harmonics is above [`SH_DEGREE_MAX`] or the
-///   origin is not finite.
-/// - [`SplatPlyError::Splat`] when a splat fails [`Splat::validate`].
-/// - [`SplatPlyError::NotWritten`] when a file exists and `overwrite` is false, or cannot be
-///   written.
+/// [`FormatError`] when the degree of the harmonics is above [`SH_DEGREE_MAX`], the origin is not
+/// finite, or a splat fails [`Splat::validate`]; when a file exists and `overwrite` is false, or
+/// cannot be written.
 pub fn write(
     path: &Path,
     splats: &[Splat],
     origin: &LocalOrigin,
     layout: SplatLayout,
     overwrite: bool,
-) -> Result<(), SplatPlyError> {
+) -> Result<(), FormatError> {
     checked(path, splats, layout, overwrite)?;
     // The splats are written last, so that a file of splats always has its origin.
     origin.write_beside(path, overwrite)?;
@@ -37,18 +35,18 @@ pub fn write(
 /// properties more, and the table beside them.
 ///
 /// # Errors
-/// Those of [`write()`]; [`SplatPlyError::Invalid`] when the labels are not as many as the splats.
+/// Those of [`write()`]; [`FormatError`] also when the labels are not as many as the splats.
 ///
 /// # Panics
 /// If there are harmonics of fewer splats.
-pub fn write_file(path: &Path, file: &SplatFile, overwrite: bool) -> Result<(), SplatPlyError> {
+pub fn write_file(path: &Path, file: &SplatFile, overwrite: bool) -> Result<(), FormatError> {
     let SplatFile { splats, harmonics, labels, layout, origin } = file;
     checked(path, splats, *layout, overwrite)?;
     if let Some(labels) = labels {
         if labels.of.len() != splats.len() {
             let what =
                 format!("there are {} labels, expected one for each of {} splats", labels.of.len(), splats.len());
-            return Err(invalid(path, what));
+            return Err(FormatError::new(path, what));
         }
         labels.table.write_beside(path, overwrite)?;
     }
@@ -60,18 +58,15 @@ pub fn write_file(path: &Path, file: &SplatFile, overwrite: bool) -> Result<(), 
 }
 
 /// Checks what is to be written, before anything is.
-pub(crate) fn checked(
-    path: &Path,
-    splats: &[Splat],
-    layout: SplatLayout,
-    overwrite: bool,
-) -> Result<(), SplatPlyError> {
+pub(crate) fn checked(path: &Path, splats: &[Splat], layout: SplatLayout, overwrite: bool) -> Result<(), FormatError> {
     if layout.sh_degree > SH_DEGREE_MAX {
         let what = format!("the degree of the harmonics is {}, expected 0 to {SH_DEGREE_MAX}", layout.sh_degree);
-        return Err(invalid(path, what));
+        return Err(FormatError::new(path, what));
     }
     for (index, splat) in splats.iter().enumerate() {
-        splat.validate().map_err(|source| SplatPlyError::Splat { path: path.to_owned(), index, source })?;
+        splat.validate().map_err(|source| {
+            FormatError::because(path, format!("splat {index} cannot be written ({source})"), source)
+        })?;
     }
     Ok(refuse_existing(path, overwrite)?)
 }

@@ -26,8 +26,9 @@ use std::path::Path;
 
 use camera::{Lens, Pose, Similarity};
 
-use crate::camera_file::{CameraFileError, Fault, read_bytes};
+use crate::camera_file::{Fault, read_bytes};
 use crate::colmap::{ColmapModel, ColmapView, is_inside};
+use crate::format_error::FormatError;
 use schema::{File, Frame, Matrix};
 
 /// Largest file that is read, bytes.
@@ -41,8 +42,8 @@ const FRAMES_LIMIT: usize = 1 << 22;
 /// `size` is the number of columns and rows of the images, for files without it, such as Blender's.
 ///
 /// # Errors
-/// [`CameraFileError::Unreadable`] when the system cannot read the file,
-/// [`CameraFileError::Invalid`] when it is too large or breaks the format.
+/// [`FormatError`] when the system cannot read the file, and when it is too large or breaks the
+/// format.
 ///
 /// # Examples
 /// ```
@@ -55,7 +56,7 @@ const FRAMES_LIMIT: usize = 1 << 22;
 /// assert_eq!(model.views[0].pose.centre, [10.0, 20.0, 30.0]);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn read(path: impl AsRef<Path>, size: Option<[usize; 2]>) -> Result<ColmapModel, CameraFileError> {
+pub fn read(path: impl AsRef<Path>, size: Option<[usize; 2]>) -> Result<ColmapModel, FormatError> {
     let path = path.as_ref();
     parse(&read_bytes(path, SIZE_LIMIT)?, size).map_err(|fault| fault.at(path))
 }

@@ -124,7 +124,9 @@ fn the_file_is_read_from_its_place() {
     let path = folder.path().join("transforms.json");
     std::fs::write(&path, one_frame(SIMPLE, UNIT)).unwrap();
     assert_eq!(read(&path, None).unwrap().views.len(), 1);
-    assert!(matches!(read(folder.path().join("none"), None), Err(CameraFileError::Unreadable { .. })));
+    let missing = read(folder.path().join("none"), None).unwrap_err().to_string();
+    assert!(missing.starts_with("cannot read the file ("), "{missing}");
     std::fs::write(&path, "{").unwrap();
-    assert!(matches!(read(&path, None), Err(CameraFileError::Invalid { .. })));
+    let broken = read(&path, None).unwrap_err().to_string();
+    assert!(broken.ends_with(&format!(" (JSON): {}", path.display())), "{broken}");
 }

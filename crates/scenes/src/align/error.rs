@@ -5,8 +5,7 @@ use std::path::PathBuf;
 use colmap::align::AlignError;
 use crs::CrsError;
 use geodesy::GeodesyError;
-use io::colmap::ColmapError;
-use io::control::ControlError;
+use io::FormatError;
 use io::raster::RasterError;
 use numeric::{Cancelled, failures};
 
@@ -28,12 +27,6 @@ pub(crate) enum AlignJobError {
         /// The level, metres or degrees.
         level: f64,
     },
-    /// The COLMAP model cannot be read.
-    #[error(transparent)]
-    Model(#[from] ColmapError),
-    /// The table of positions cannot be read.
-    #[error(transparent)]
-    Positions(#[from] ControlError),
     /// The CRS or the vertical datum cannot be used.
     #[error(transparent)]
     Crs(#[from] CrsError),
@@ -106,8 +99,6 @@ pub(crate) enum AlignJobError {
 }
 
 failures!(AlignJobError: Other {
-    Self::Model(error) => error.kind(),
-    Self::Positions(error) => error.kind(),
     Self::Crs(error) => error.kind(),
     Self::Picture(error) => error.kind(),
     Self::Job(error) => error.kind(),
@@ -119,4 +110,4 @@ job_errors!(AlignJobError {
     Self::NotMetres { .. } => Some("the reference system"),
 });
 
-from_steps!(AlignJobError: Job(FileError, Cancelled));
+from_steps!(AlignJobError: Job(FileError, Cancelled, FormatError));

@@ -2,10 +2,8 @@
 
 use std::path::PathBuf;
 
-use io::colmap::ColmapError;
-use io::npy::NpyError;
+use io::FormatError;
 use io::raster::RasterError;
-use io::splat_ply::SplatPlyError;
 use numeric::{Cancelled, failures};
 use tsdf::FusionError;
 
@@ -16,18 +14,9 @@ use job::files::FileError;
 /// A mesh that is not made.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum MeshJobError {
-    /// The cameras cannot be read.
-    #[error(transparent)]
-    Model(#[from] ColmapError),
     /// The place of the dataset cannot be read.
     #[error(transparent)]
     Place(Box<TrainError>),
-    /// The splats cannot be read.
-    #[error(transparent)]
-    Ply(#[from] SplatPlyError),
-    /// A depth map or mask cannot be read.
-    #[error(transparent)]
-    Map(#[from] NpyError),
     /// An image cannot be read.
     #[error(transparent)]
     Image(#[from] RasterError),
@@ -83,10 +72,7 @@ pub(crate) enum MeshJobError {
 }
 
 failures!(MeshJobError: Other {
-    Self::Model(error) => error.kind(),
     Self::Place(error) => error.kind(),
-    Self::Ply(error) => error.kind(),
-    Self::Map(error) => error.kind(),
     Self::Image(error) => error.kind(),
     Self::Comparison(error) => error.kind(),
     Self::Job(error) => error.kind(),
@@ -102,4 +88,4 @@ impl From<TrainError> for MeshJobError {
     }
 }
 
-from_steps!(MeshJobError: Job(FileError, SettingError, Cancelled));
+from_steps!(MeshJobError: Job(FileError, SettingError, Cancelled, FormatError));

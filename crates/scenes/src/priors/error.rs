@@ -7,12 +7,9 @@ use camera::{FitError, LensError, SimilarityError};
 use city::ModelError;
 use cityfiles::CityError;
 use crs::CrsError;
-use io::camera_file::CameraFileError;
-use io::colmap::ColmapError;
-use io::npy::NpyError;
+use io::FormatError;
 use io::raster::RasterError;
 use io::rpc::RpcReadError;
-use io::similarity::SimilarityFileError;
 use numeric::{Cancelled, Kind, failures};
 use report::PictureError;
 
@@ -229,24 +226,12 @@ pub(crate) enum PriorsJobError {
     /// The city model contradicts itself.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// The COLMAP model cannot be read.
-    #[error(transparent)]
-    Colmap(#[from] ColmapError),
-    /// The transforms.json cannot be read.
-    #[error(transparent)]
-    Transforms(#[from] CameraFileError),
-    /// The similarity cannot be read.
-    #[error(transparent)]
-    Transform(#[from] SimilarityFileError),
     /// The pointing correction cannot be folded into the RPC.
     #[error(transparent)]
     Fold(#[from] FitError),
     /// A coordinate reference system cannot be used.
     #[error(transparent)]
     Crs(#[from] CrsError),
-    /// A map that was written cannot be read back.
-    #[error(transparent)]
-    Npy(#[from] NpyError),
     /// A picture of the report cannot be made.
     #[error(transparent)]
     Picture(#[from] PictureError),
@@ -260,11 +245,7 @@ failures!(PriorsJobError: Other {
     Self::SatelliteImage { source, .. } => source.kind(),
     Self::City(error) => error.kind(),
     Self::Priors(error) | Self::MapUnknown { source: error } => error.kind(),
-    Self::Colmap(error) => error.kind(),
-    Self::Transforms(error) => error.kind(),
-    Self::Transform(error) => error.kind(),
     Self::Crs(error) => error.kind(),
-    Self::Npy(error) => error.kind(),
     Self::Job(error) => error.kind(),
 });
 
@@ -280,7 +261,7 @@ job_errors!(PriorsJobError {
     Self::Lens { source: LensFault::OffMiddle { .. }, .. } => Some("the principal point"),
 });
 
-from_steps!(PriorsJobError: Job(FileError, Cancelled, RasterError, RpcReadError));
+from_steps!(PriorsJobError: Job(FileError, Cancelled, RasterError, RpcReadError, FormatError));
 
 /// What a trainer cannot do with a lens.
 #[derive(Debug, thiserror::Error)]

@@ -3,8 +3,9 @@
 use std::path::PathBuf;
 
 use camera::{CameraError, FitError};
+use io::FormatError;
 use io::raster::RasterError;
-use io::rpc::{RpcReadError, RpcWriteError};
+use io::rpc::{ReadOnlyFormat, RpcReadError};
 use numeric::{Kind, failures};
 
 use job::error::{JobError, SettingError, from_steps, job_errors};
@@ -17,9 +18,9 @@ pub(crate) enum RpcJobError {
     /// The file holds no RPC that can be used.
     #[error(transparent)]
     Read(Box<RpcReadError>),
-    /// The RPC cannot be written.
+    /// The RPC cannot be written in a format.
     #[error(transparent)]
-    Write(#[from] RpcWriteError),
+    Write(#[from] ReadOnlyFormat),
     /// The ending of the output file belongs to no format.
     #[error(
         "no RPC format belongs to the ending of {}: expected .txt, .rpc, .rpb, .json or .tif, or a stated format",
@@ -145,7 +146,7 @@ job_errors!(RpcJobError {
     Self::NotEmpty { .. } => Some("the output folder"),
 });
 
-from_steps!(RpcJobError: Read(RpcReadError), Job(FileError, SettingError));
+from_steps!(RpcJobError: Read(RpcReadError), Job(FileError, SettingError, FormatError));
 
 /// What is wrong with a line of points.
 #[derive(Debug, thiserror::Error)]

@@ -8,10 +8,10 @@ use camera::SimilarityError;
 use city::ModelError;
 use cityfiles::CityError;
 use crs::CrsError;
+use io::FormatError;
 use io::raster::RasterError;
 use io::rpc::RpcReadError;
-use io::similarity::SimilarityFileError;
-use io::splat_ply::{LocalOrigin, SplatPlyError};
+use io::splat_ply::LocalOrigin;
 use numeric::{Cancelled, failures};
 
 use job::error::{JobError, SettingError, from_steps, job_errors};
@@ -43,9 +43,6 @@ pub(crate) enum SplatsJobError {
     /// No splats follow from the inputs.
     #[error(transparent)]
     Splats(#[from] SplatError),
-    /// The splats cannot be read.
-    #[error(transparent)]
-    Ply(#[from] SplatPlyError),
     /// No origin lies beside the splats.
     #[error("no origin beside the splats: expected {}", path.display())]
     NoOrigin {
@@ -94,9 +91,6 @@ pub(crate) enum SplatsJobError {
         /// Number of its objects.
         objects: usize,
     },
-    /// The similarity from the city model to the splats cannot be read.
-    #[error(transparent)]
-    Transform(#[from] SimilarityFileError),
     /// The origin of splats or city model is not finite.
     #[error(transparent)]
     Similarity(#[from] SimilarityError),
@@ -143,10 +137,8 @@ pub(crate) enum SplatsJobError {
 failures!(SplatsJobError: Other {
     Self::Confidence(error) => error.kind(),
     Self::Crs(error) => error.kind(),
-    Self::Ply(error) => error.kind(),
     Self::City(error) => error.kind(),
     Self::Priors(error) => error.kind(),
-    Self::Transform(error) => error.kind(),
     Self::Job(error) => error.kind(),
 });
 
@@ -155,4 +147,4 @@ job_errors!(SplatsJobError {
     Self::NotPlaced { .. } => Some("the place of the splats"),
 });
 
-from_steps!(SplatsJobError: Job(FileError, SettingError, Cancelled, RasterError, RpcReadError));
+from_steps!(SplatsJobError: Job(FileError, SettingError, Cancelled, RasterError, RpcReadError, FormatError));

@@ -4,12 +4,9 @@ use std::path::PathBuf;
 
 use ::train::CheckpointDefect;
 use crs::CrsError;
-use io::camera_file::CameraFileError;
-use io::colmap::ColmapError;
-use io::npy::NpyError;
+use io::FormatError;
 use io::raster::RasterError;
 use io::rpc::RpcReadError;
-use io::splat_ply::SplatPlyError;
 use numeric::{Cancelled, failures};
 
 use job::error::{JobError, SettingError, from_steps, job_errors};
@@ -18,21 +15,9 @@ use job::files::FileError;
 /// A training that gives no splats.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum TrainError {
-    /// The cameras or points cannot be read.
-    #[error(transparent)]
-    Model(#[from] ColmapError),
-    /// The cameras of a transforms.json cannot be read.
-    #[error(transparent)]
-    Transforms(#[from] CameraFileError),
-    /// A prior map cannot be read.
-    #[error(transparent)]
-    Map(#[from] NpyError),
     /// A coordinate reference system cannot be used.
     #[error(transparent)]
     Crs(#[from] CrsError),
-    /// The splats cannot be written.
-    #[error(transparent)]
-    Ply(#[from] SplatPlyError),
     /// A file of the dataset is not as the priors job writes it.
     #[error("{what}: {}", path.display())]
     Dataset {
@@ -133,16 +118,12 @@ pub(crate) enum TrainError {
 }
 
 failures!(TrainError: Other {
-    Self::Model(error) => error.kind(),
-    Self::Transforms(error) => error.kind(),
-    Self::Map(error) => error.kind(),
     Self::Crs(error) => error.kind(),
-    Self::Ply(error) => error.kind(),
     Self::Job(error) => error.kind(),
 });
 
 job_errors!(TrainError);
 
 from_steps!(
-    TrainError: Job(FileError, SettingError, Cancelled, RasterError, RpcReadError)
+    TrainError: Job(FileError, SettingError, Cancelled, RasterError, RpcReadError, FormatError)
 );

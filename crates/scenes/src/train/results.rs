@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use ::train::TrainingState;
-use io::splat_ply::{self, LocalOrigin, SplatFile, SplatForm, SplatLayout, SplatPlyError};
+use io::FormatError;
+use io::splat_ply::{self, LocalOrigin, SplatFile, SplatForm, SplatLayout};
 
 use super::checkpoint::Checkpoint;
 use super::error::TrainError;
@@ -52,7 +53,7 @@ pub(super) fn write_splats(
     state: &TrainingState,
     origin: &LocalOrigin,
     overwrite: bool,
-) -> Result<PathBuf, SplatPlyError> {
+) -> Result<PathBuf, FormatError> {
     let path = output.join(SPLATS);
     let file = SplatFile {
         splats: state.surfels.iter().map(|s| s.to_splat(THICKNESS_M)).collect(),

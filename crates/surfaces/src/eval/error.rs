@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use crs::{CrsError, VerticalDatum};
+use io::FormatError;
 use numeric::{Cancelled, Kind, failures};
 
 use job::error::{FileCrsError, JobError, SettingError, from_steps, job_errors};
@@ -14,15 +15,6 @@ pub(crate) enum EvalJobError {
     /// A raster cannot be read.
     #[error(transparent)]
     Raster(#[from] io::raster::RasterError),
-    /// A point cloud cannot be read.
-    #[error(transparent)]
-    Points(#[from] io::points::PointsError),
-    /// A mesh, city model or cloud cannot be read.
-    #[error(transparent)]
-    SurfaceFile(#[from] cityfiles::surfaces::SurfaceFileError),
-    /// A map in the pixels of a camera cannot be read.
-    #[error(transparent)]
-    MapFile(#[from] io::maps::MapError),
     /// The coordinate reference system of a file cannot be used.
     #[error(transparent)]
     FileCrs(#[from] FileCrsError),
@@ -144,9 +136,6 @@ pub(crate) enum EvalJobError {
 failures!(EvalJobError: Other {
     Self::ForeignFile { .. } => Kind::OutputExists,
     Self::Raster(error) => error.kind(),
-    Self::Points(error) => error.kind(),
-    Self::SurfaceFile(error) => error.kind(),
-    Self::MapFile(error) => error.kind(),
     Self::FileCrs(error) => error.kind(),
     Self::Crs(error) => error.kind(),
     Self::Job(error) => error.kind(),
@@ -160,4 +149,4 @@ job_errors!(EvalJobError {
     Self::Grids(eval::EvalError::SkipWithoutClasses) => Some("the classes"),
 });
 
-from_steps!(EvalJobError: Job(SettingError, FileError, Cancelled));
+from_steps!(EvalJobError: Job(SettingError, FileError, Cancelled, FormatError));

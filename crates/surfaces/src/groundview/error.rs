@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use crs::CrsError;
+use io::FormatError;
 use numeric::{Cancelled, Kind, failures};
 
 use crate::camera_stand::StandError;
@@ -16,9 +17,6 @@ pub(crate) enum GroundViewError {
     /// A camera cannot be used.
     #[error(transparent)]
     Stand(#[from] StandError),
-    /// The list of positions cannot be read.
-    #[error(transparent)]
-    Positions(#[from] io::positions::PositionsError),
     /// The folder holds the report of earlier views.
     #[error("the folder holds views already; choose another folder: {}", path.display())]
     FolderInUse {
@@ -104,7 +102,6 @@ pub(crate) enum GroundViewError {
 failures!(GroundViewError: Other {
     Self::FolderInUse { .. } => Kind::OutputExists,
     Self::Stand(error) => error.kind(),
-    Self::Positions(error) => error.kind(),
     Self::City(error) => error.kind(),
     Self::Crs(error) => error.kind(),
     Self::PlacedModel(error) => error.kind(),
@@ -118,4 +115,4 @@ job_errors!(GroundViewError {
     Self::PlacedModel(_) => Some("the cameras"),
 });
 
-from_steps!(GroundViewError: Job(SettingError, FileError, Cancelled));
+from_steps!(GroundViewError: Job(SettingError, FileError, Cancelled, FormatError));

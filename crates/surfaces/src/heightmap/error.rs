@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use crs::CrsError;
 use heightmap::HeightMapError;
+use io::FormatError;
 use numeric::{Cancelled, Kind, failures};
 
 use crate::camera_stand::StandError;
@@ -17,9 +18,6 @@ pub(crate) enum HeightMapJobError {
     /// A camera cannot be used.
     #[error(transparent)]
     Stand(#[from] StandError),
-    /// The list of positions cannot be read.
-    #[error(transparent)]
-    Positions(#[from] io::positions::PositionsError),
     /// A raster cannot be read.
     #[error(transparent)]
     Raster(#[from] io::raster::RasterError),
@@ -32,9 +30,6 @@ pub(crate) enum HeightMapJobError {
         /// The model.
         path: PathBuf,
     },
-    /// A point cloud cannot be read.
-    #[error(transparent)]
-    Points(#[from] io::points::PointsError),
     /// A point cloud failed while it was read for several tiles.
     #[error("{reason}")]
     PointsStopped {
@@ -157,10 +152,8 @@ pub(crate) enum HeightMapJobError {
 failures!(HeightMapJobError: Other {
     Self::OtherMap { .. } => Kind::OutputExists,
     Self::Stand(error) => error.kind(),
-    Self::Positions(error) => error.kind(),
     Self::Raster(error) => error.kind(),
     Self::City(error) => error.kind(),
-    Self::Points(error) => error.kind(),
     Self::FileCrs(error) => error.kind(),
     Self::Crs(error) => error.kind(),
     Self::Tile(error) => error.kind(),
@@ -177,4 +170,4 @@ job_errors!(HeightMapJobError {
     Self::MirroredAxes => Some("the axes of the splats"),
 });
 
-from_steps!(HeightMapJobError: Job(FileError, Cancelled));
+from_steps!(HeightMapJobError: Job(FileError, Cancelled, FormatError));

@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use camera::CameraError;
 use crs::CrsError;
+use io::FormatError;
 use io::raster::RasterError;
 use io::rpc::RpcReadError;
-use io::splat_ply::SplatPlyError;
 use numeric::{Cancelled, failures};
 
 use crate::ortho::OrthoError;
@@ -28,9 +28,6 @@ pub(crate) enum RegisterError {
         /// The surface model.
         path: PathBuf,
     },
-    /// The splats cannot be read.
-    #[error(transparent)]
-    Splats(#[from] SplatPlyError),
     /// No origin lies beside the splats.
     #[error("no origin beside the splats: expected {}", path.display())]
     NoOrigin {
@@ -88,7 +85,6 @@ pub(crate) enum RegisterError {
 }
 
 failures!(RegisterError: Other {
-    Self::Splats(error) => error.kind(),
     Self::Laid(error) => error.kind(),
     Self::Crs(error) => error.kind(),
     Self::Job(error) => error.kind(),
@@ -101,6 +97,6 @@ job_errors!(RegisterError {
 });
 
 from_steps!(
-    RegisterError: Job(SettingError, FileError, Cancelled, RasterError, RpcReadError),
+    RegisterError: Job(SettingError, FileError, Cancelled, RasterError, RpcReadError, FormatError),
     Laid(OrthoError)
 );

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use io::positions::PositionsError;
+use io::FormatError;
 use io::raster::RasterError;
 use io::rpc::RpcReadError;
 use numeric::{Cancelled, Kind, failures};
@@ -61,4 +61,4 @@ job_errors!(TilesError {
     Self::NoImages { .. } => Some("the images"),
 });
 
-from_steps!(TilesError: Job(FileError, Cancelled, RasterError, RpcReadError), Map(StandError, PositionsError));
+from_steps!(TilesError: Job(FileError, Cancelled, RasterError, RpcReadError, FormatError), Map(StandError));

@@ -18,9 +18,9 @@ use std::path::Path;
 use camera::ImagePoint;
 
 use super::convention::is_inside;
-use super::error::ColmapError;
 use super::model::{ColmapModel, ColmapPoint};
 use crate::atomic::{refuse_existing, write_stream};
+use crate::format_error::FormatError;
 use observations::ImageObservations;
 
 /// Encoding of the files of a model.
@@ -42,22 +42,21 @@ impl ColmapEncoding {
 /// Writes a model with its points into an existing folder.
 ///
 /// # Errors
-/// - [`ColmapError::NotWritten`] when a file exists and `overwrite` is false, or the system refuses
-///   to write.
-/// - [`ColmapError::Inconsistent`] when the folder holds `rigs` or `frames` of another model, a
-///   view has no lens, two views share an identifier, an image name leads out of its folder or has
-///   control characters, a pose or a point is not finite, or a track names a view that does not
-///   exist. Nothing is written then.
+/// [`FormatError`]
+/// - when a file exists and `overwrite` is false, or the system refuses to write;
+/// - when the folder holds `rigs` or `frames` of another model, a view has no lens, two views share
+///   an identifier, an image name leads out of its folder or has control characters, a pose or a
+///   point is not finite, or a track names a view that does not exist. Nothing is written then.
 pub fn write(
     folder: &Path,
     model: &ColmapModel,
     points: &[ColmapPoint],
     encoding: ColmapEncoding,
     overwrite: bool,
-) -> Result<(), ColmapError> {
+) -> Result<(), FormatError> {
     check(model, points)
         .and_then(|()| no_rigs(folder))
-        .map_err(|what| ColmapError::Inconsistent { folder: folder.to_owned(), what })?;
+        .map_err(|what| FormatError::new(folder, format_args!("the model cannot be written ({what})")))?;
     let seen = ImageObservations::of(model.views.len(), points);
     let extension = match encoding {
         ColmapEncoding::Binary => "bin",

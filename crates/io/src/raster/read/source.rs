@@ -260,7 +260,7 @@ fn grid_of<T>(path: &Path, inside: Window, data: Vec<T>) -> Result<Grid<T>, Rast
 /// Reads the item at a path; `None` where the name is not that of one.
 fn item_at(path: &Path) -> Result<Option<StacItem>, RasterError> {
     let read = is_item_name(path).then(|| read_item(path)).transpose();
-    read.map_err(|source| RasterError::Item { path: path.to_owned(), source })
+    read.map_err(|source| RasterError::Item { path: path.to_owned(), source: source.into() })
 }
 
 fn describe(path: &Path, dataset: &Dataset) -> Result<ImageInfo, RasterError> {
