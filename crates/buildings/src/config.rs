@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::error::BuildingIndexError;
+use crate::error::{BuildingIndexError, Reason};
 
 /// Parameters of the building index. Lengths are those of buildings and follow no scene.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -69,11 +69,11 @@ impl BuildingIndexConfig {
     /// Checks the ranges of the parameters.
     ///
     /// # Errors
-    /// [`BuildingIndexError::Parameter`] for the first that is outside of its range.
+    /// [`BuildingIndexError`] for the first that is outside of its range.
     pub fn validate(&self) -> Result<(), BuildingIndexError> {
         let within = |name, found: f64, low: f64, high: f64, expected| {
             let is_good = found >= low && found <= high;
-            if is_good { Ok(()) } else { Err(BuildingIndexError::Parameter { name, found, expected }) }
+            if is_good { Ok(()) } else { Err(BuildingIndexError(Reason::Parameter { name, found, expected })) }
         };
         within("the smoothing", self.smoothing_m, 0.0, 10.0, "0 to 10 m")?;
         within("the shortest side of a building", self.least_side_m, 0.5, 100.0, "0.5 to 100 m")?;

@@ -4,8 +4,12 @@ use numeric::Cancelled;
 
 /// A building index that cannot be computed.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum BuildingIndexError {
+#[error(transparent)]
+pub struct BuildingIndexError(#[from] pub(crate) Reason);
+
+/// Why there is no building index.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum Reason {
     /// A parameter is outside of its range.
     #[error("{name} is {found}, expected {expected}")]
     Parameter {
@@ -32,6 +36,12 @@ pub enum BuildingIndexError {
     /// The work was cancelled.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
+}
+
+impl From<Cancelled> for BuildingIndexError {
+    fn from(cancelled: Cancelled) -> Self {
+        Reason::from(cancelled).into()
+    }
 }
 
 /// Most pixels of the longest side.

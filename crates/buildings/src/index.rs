@@ -5,7 +5,7 @@ use raster::{Grid, gaussian, height_percentiles};
 use rayon::prelude::*;
 
 use crate::config::BuildingIndexConfig;
-use crate::error::{BuildingIndexError, SIDE_MAX};
+use crate::error::{BuildingIndexError, Reason, SIDE_MAX};
 use crate::gradient::gradients;
 use crate::junctions::{BranchLimits, junctions};
 use crate::shadow::black_top_hat;
@@ -48,8 +48,8 @@ pub struct BuildingIndex {
 /// ```
 ///
 /// # Errors
-/// [`BuildingIndexError::Parameter`] for a parameter outside of its range,
-/// [`BuildingIndexError::Scale`] for pixels that are too coarse or too fine.
+/// [`BuildingIndexError`] for a parameter outside of its range, for pixels that are too coarse or
+/// too fine, and when the caller asked to stop.
 pub fn building_index(
     image: &Grid<f32>,
     gsd_m: f64,
@@ -59,7 +59,7 @@ pub fn building_index(
     config.validate()?;
     let (finest_m, coarsest_m) = (config.most_side_m / SIDE_MAX as f64, config.least_side_m / 4.0);
     if !(gsd_m >= finest_m && gsd_m <= coarsest_m) {
-        return Err(BuildingIndexError::Scale { gsd_m, finest_m, coarsest_m });
+        return Err(Reason::Scale { gsd_m, finest_m, coarsest_m }.into());
     }
     let pixels = |length_m: f64| length_m / gsd_m;
     let area = |area_m2: f64| (area_m2 / (gsd_m * gsd_m)) as f32;

@@ -98,8 +98,12 @@ impl LensModel {
 
 /// Parameters that do not form a lens.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum LensError {
+#[error(transparent)]
+pub struct LensError(#[from] Reason);
+
+/// Why parameters do not form a lens.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+enum Reason {
     /// Too few or too many parameters.
     #[error("the lens model {model} has {expected} parameters, found {found}")]
     Count {
@@ -163,15 +167,16 @@ impl Lens {
     pub fn new(width: usize, height: usize, model: LensModel, parameters: &[f64]) -> Result<Self, LensError> {
         let name = model.name();
         if width == 0 || height == 0 || width > 1 << 24 || height > 1 << 24 {
-            return Err(LensError::Size { width: width as u64, height: height as u64 });
+            return Err(Reason::Size { width: width as u64, height: height as u64 }.into());
         }
         if parameters.len() != model.parameter_count() {
-            return Err(LensError::Count { model: name, expected: model.parameter_count(), found: parameters.len() });
+            let (expected, found) = (model.parameter_count(), parameters.len());
+            return Err(Reason::Count { model: name, expected, found }.into());
         }
         let focal_count = if model.has_one_focal_length() { 1 } else { 2 };
         let bad = |(index, value): &(usize, &f64)| !value.is_finite() || (*index < focal_count && **value <= 0.0);
         if let Some((index, &value)) = parameters.iter().enumerate().find(bad) {
-            return Err(LensError::Parameter { model: name, index, value });
+            return Err(Reason::Parameter { model: name, index, value }.into());
         }
         let (focal, rest) = parameters.split_at(focal_count);
         Ok(Self {
@@ -463,10 +468,10 @@ mod tests {
     #[test]
     fn numbers_that_make_no_lens() {
         let made = |width, parameters: &[f64]| Lens::new(width, 8, LensModel::Pinhole, parameters);
-        assert!(matches!(made(8, &[1.0, 1.0, 4.0]), Err(LensError::Count { expected: 4, found: 3, .. })));
-        assert!(matches!(made(8, &[1.0, 0.0, 4.0, 4.0]), Err(LensError::Parameter { index: 1, .. })));
-        assert!(matches!(made(8, &[1.0, 1.0, f64::NAN, 4.0]), Err(LensError::Parameter { index: 2, .. })));
-        assert!(matches!(made(0, &[1.0, 1.0, 4.0, 4.0]), Err(LensError::Size { .. })));
+        assert!(matches!(made(8, &[1.0, 1.0, 4.0]), Err(LensError(Reason::Count { expected: 4, found: 3, .. }))));
+        assert!(matches!(made(8, &[1.0, 0.0, 4.0, 4.0]), Err(LensError(Reason::Parameter { index: 1, .. }))));
+        assert!(matches!(made(8, &[1.0, 1.0, f64::NAN, 4.0]), Err(LensError(Reason::Parameter { index: 2, .. }))));
+        assert!(matches!(made(0, &[1.0, 1.0, 4.0, 4.0]), Err(LensError(Reason::Size { .. }))));
     }
 
     #[test]

@@ -20,8 +20,12 @@ pub struct Similarity {
 
 /// Numbers that do not form a similarity.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum SimilarityError {
+#[error(transparent)]
+pub struct SimilarityError(#[from] Reason);
+
+/// Why numbers do not form a similarity.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+enum Reason {
     /// A number is NaN or infinite.
     #[error("a number of the similarity is not finite")]
     NotFinite,
@@ -56,10 +60,10 @@ impl Similarity {
     /// from a rotation by more than 1e-4.
     pub fn new(scale: f64, rotation: [[f64; 3]; 3], translation: [f64; 3]) -> Result<Self, SimilarityError> {
         if !scale.is_finite() || !rotation.as_flattened().iter().chain(&translation).all(|c| c.is_finite()) {
-            return Err(SimilarityError::NotFinite);
+            return Err(Reason::NotFinite.into());
         }
         if !(1e-9..=1e9).contains(&scale) {
-            return Err(SimilarityError::Scale { scale });
+            return Err(Reason::Scale { scale }.into());
         }
         let rotation = proper_rotation(&rotation)?;
         Ok(Self { scale, rotation, translation })
@@ -71,13 +75,13 @@ impl Similarity {
     /// The same as for [`Similarity::new`].
     pub fn from_matrix(rows: [[f64; 4]; 3]) -> Result<Self, SimilarityError> {
         if !rows.as_flattened().iter().all(|c| c.is_finite()) {
-            return Err(SimilarityError::NotFinite);
+            return Err(Reason::NotFinite.into());
         }
         let linear = rows.map(|[a, b, c, _]| [a, b, c]);
         let det = determinant(&linear);
         let scale = det.abs().cbrt();
         if !(1e-9..=1e9).contains(&scale) {
-            return Err(SimilarityError::Scale { scale });
+            return Err(Reason::Scale { scale }.into());
         }
         Self::new(scale, linear.map(|row| row.map(|c| c / scale)), rows.map(|row| row[3]))
     }
@@ -136,22 +140,22 @@ impl Similarity {
 }
 
 /// Returns the rotation nearest to a matrix that is a rotation up to rounding.
-fn proper_rotation(r: &[[f64; 3]; 3]) -> Result<[[f64; 3]; 3], SimilarityError> {
+fn proper_rotation(r: &[[f64; 3]; 3]) -> Result<[[f64; 3]; 3], Reason> {
     let dot = |i: usize, j: usize| (0..3).map(|k| r[i][k] * r[j][k]).sum::<f64>();
     let off = (0..9).map(|n| (dot(n / 3, n % 3) - if n / 3 == n % 3 { 1.0 } else { 0.0 }).abs()).fold(0.0, f64::max);
     // The entries are finite, but their squares may not be.
     if off.is_nan() || off > ORTHOGONAL {
-        return Err(SimilarityError::NotARotation { off });
+        return Err(Reason::NotARotation { off });
     }
     if determinant(r) < 0.0 {
-        return Err(SimilarityError::Mirror);
+        return Err(Reason::Mirror);
     }
     // A matrix that is exact already keeps its bits.
     if off < 4.0 * f64::EPSILON {
         return Ok(*r);
     }
     let exact = Pose::from_quaternion(quaternion_from_rotation(r), [0.0; 3]);
-    exact.map(|pose| pose.rotation).ok_or(SimilarityError::NotARotation { off })
+    exact.map(|pose| pose.rotation).ok_or(Reason::NotARotation { off })
 }
 
 fn determinant(r: &[[f64; 3]; 3]) -> f64 {
@@ -208,12 +212,12 @@ mod tests {
         let unit = Similarity::IDENTITY.rotation();
         let mirror = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]];
         let shear = [[1.0, 0.1, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-        assert_eq!(Similarity::new(1.0, mirror, [0.0; 3]), Err(SimilarityError::Mirror));
-        assert!(matches!(Similarity::new(1.0, shear, [0.0; 3]), Err(SimilarityError::NotARotation { .. })));
-        assert!(matches!(Similarity::new(0.0, unit, [0.0; 3]), Err(SimilarityError::Scale { .. })));
-        assert!(matches!(Similarity::new(-1.0, unit, [0.0; 3]), Err(SimilarityError::Scale { .. })));
-        assert_eq!(Similarity::new(1.0, unit, [f64::NAN, 0.0, 0.0]), Err(SimilarityError::NotFinite));
-        assert!(matches!(Similarity::from_matrix([[0.0; 4]; 3]), Err(SimilarityError::Scale { .. })));
+        assert_eq!(Similarity::new(1.0, mirror, [0.0; 3]), Err(SimilarityError(Reason::Mirror)));
+        assert!(matches!(Similarity::new(1.0, shear, [0.0; 3]), Err(SimilarityError(Reason::NotARotation { .. }))));
+        assert!(matches!(Similarity::new(0.0, unit, [0.0; 3]), Err(SimilarityError(Reason::Scale { .. }))));
+        assert!(matches!(Similarity::new(-1.0, unit, [0.0; 3]), Err(SimilarityError(Reason::Scale { .. }))));
+        assert_eq!(Similarity::new(1.0, unit, [f64::NAN, 0.0, 0.0]), Err(SimilarityError(Reason::NotFinite)));
+        assert!(matches!(Similarity::from_matrix([[0.0; 4]; 3]), Err(SimilarityError(Reason::Scale { .. }))));
         assert_eq!(Similarity::new(1.0, unit, [0.0; 3]), Ok(Similarity::IDENTITY));
     }
 }

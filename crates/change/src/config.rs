@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::error::ChangeError;
+use crate::error::{ChangeError, Reason};
 
 /// Parameters of the search for change.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -57,11 +57,11 @@ impl ChangeConfig {
     /// Checks the ranges of the parameters.
     ///
     /// # Errors
-    /// [`ChangeError::Parameter`] for the first that is outside of its range.
+    /// [`ChangeError`] for the first that is outside of its range.
     pub fn validate(&self) -> Result<(), ChangeError> {
         let within = |name, found: f64, low: f64, high: f64, expected| {
             let is_good = found >= low && found <= high;
-            if is_good { Ok(()) } else { Err(ChangeError::Parameter { name, found, expected }) }
+            if is_good { Ok(()) } else { Err(ChangeError(Reason::Parameter { name, found, expected })) }
         };
         within("the confidence", self.confidence, 0.5, 0.999_999, "0.5 to 0.999999")?;
         within("the least change", self.least_change_m, 0.0, 100.0, "0 to 100 m")?;
@@ -85,6 +85,6 @@ mod tests {
         assert!((config.overreach_of_m(15.0) - 0.4).abs() < 1e-12);
         assert!((config.overreach_of_m(130.0) - 1.6).abs() < 1e-12, "a spike is no wall");
         let wrong = ChangeConfig { overreach_growth: f64::NAN, ..config };
-        assert!(matches!(wrong.validate(), Err(ChangeError::Parameter { .. })));
+        assert!(matches!(wrong.validate(), Err(ChangeError(Reason::Parameter { .. }))));
     }
 }

@@ -6,7 +6,7 @@ use serde::Serialize;
 use crate::border::near_border;
 use crate::config::ChangeConfig;
 use crate::correlation::{ErrorCorrelation, spread};
-use crate::error::ChangeError;
+use crate::error::{ChangeError, Reason};
 use crate::normal::{ln_two_sided, two_sided_quantile};
 use crate::regions::{NONE, connected, grow, without_lines};
 use crate::tolerance::unexplained;
@@ -163,8 +163,8 @@ impl Change {
 /// ```
 ///
 /// # Errors
-/// [`ChangeError::Parameter`] for a parameter outside of its range, [`ChangeError::Size`] for
-/// rasters of different sizes, [`ChangeError::TooFewCells`] without an overlap.
+/// [`ChangeError`] for a parameter outside of its range, for rasters of different sizes, and
+/// without an overlap.
 pub fn detect(input: &ChangeInput<'_>, config: &ChangeConfig) -> Result<Change, ChangeError> {
     config.validate()?;
     check(input)?;
@@ -290,7 +290,7 @@ fn probability_at(input: &ChangeInput<'_>, at: usize) -> f64 {
 }
 
 /// Makes the rasters of differences with calibrated deviations; regions and correlation come later.
-fn calibrated(input: &ChangeInput<'_>, config: &ChangeConfig) -> Result<Change, ChangeError> {
+fn calibrated(input: &ChangeInput<'_>, config: &ChangeConfig) -> Result<Change, Reason> {
     let (width, height) = (input.before.width(), input.before.height());
     let mut difference = input.after.clone();
     difference.data_mut().iter_mut().zip(input.before.data()).for_each(|(d, before)| *d -= before);
@@ -313,7 +313,7 @@ fn calibrated(input: &ChangeInput<'_>, config: &ChangeConfig) -> Result<Change, 
     }
     let deciding_cells = significance.data().iter().filter(|z| z.is_finite()).count();
     if deciding_cells < CELLS_MIN {
-        return Err(ChangeError::TooFewCells { found: deciding_cells, observed: observed_cells, needed: CELLS_MIN });
+        return Err(Reason::TooFewCells { found: deciding_cells, observed: observed_cells, needed: CELLS_MIN });
     }
     // Identical surfaces have no spread; the least deviation keeps them apart from a division by 0.
     let factor = spread(&significance).max(1e-3);
@@ -353,10 +353,10 @@ fn masked(grid: &Grid<f32>, observed: Option<&Grid<bool>>) -> Grid<f32> {
     masked
 }
 
-fn check(input: &ChangeInput<'_>) -> Result<(), ChangeError> {
+fn check(input: &ChangeInput<'_>) -> Result<(), Reason> {
     let expected = (input.before.width(), input.before.height());
     let fits = |what, found: Option<(usize, usize)>| match found {
-        Some(found) if found != expected => Err(ChangeError::Size { what, found, expected }),
+        Some(found) if found != expected => Err(Reason::Size { what, found, expected }),
         _ => Ok(()),
     };
     fits("the second surface", Some((input.after.width(), input.after.height())))?;
@@ -365,7 +365,7 @@ fn check(input: &ChangeInput<'_>) -> Result<(), ChangeError> {
     fits("the raster of probabilities", input.probability.map(|grid| (grid.width(), grid.height())))?;
     if !(input.cell_m.is_finite() && input.cell_m > 0.0) {
         let (name, expected) = ("the side of a cell", "a positive number of metres");
-        return Err(ChangeError::Parameter { name, found: input.cell_m, expected });
+        return Err(Reason::Parameter { name, found: input.cell_m, expected });
     }
     Ok(())
 }

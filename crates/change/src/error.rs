@@ -2,8 +2,12 @@
 
 /// A change that cannot be found.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum ChangeError {
+#[error(transparent)]
+pub struct ChangeError(#[from] pub(crate) Reason);
+
+/// Why change cannot be found.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum Reason {
     /// A parameter is outside of its range.
     #[error("{name} is {found}, expected {expected}")]
     Parameter {

@@ -3,7 +3,7 @@
 use raster::Grid;
 
 use crate::config::ClassifyConfig;
-use crate::error::ClassifyError;
+use crate::error::{ClassifyError, Reason};
 use crate::regions::{closed, grow, opened, spread, take_enclosed, without_share, without_small};
 use crate::roofs::RoofScene;
 use crate::roughness::{least_residual, median_residual};
@@ -155,7 +155,7 @@ pub struct Classes {
 /// ```
 ///
 /// # Errors
-/// [`ClassifyError::Parameter`] for a parameter outside of its range, [`ClassifyError::Size`] for
+/// [`ClassifyError`] for a parameter outside of its range, and for
 /// rasters of different sizes.
 pub fn classify(input: &ClassifyInput<'_>, config: &ClassifyConfig) -> Result<Classes, ClassifyError> {
     config.validate()?;
@@ -312,10 +312,10 @@ fn likely_buildings(
     (0..input.surface.data().len()).map(is_likely).collect()
 }
 
-fn check(input: &ClassifyInput<'_>) -> Result<(), ClassifyError> {
+fn check(input: &ClassifyInput<'_>) -> Result<(), Reason> {
     let expected = (input.surface.width(), input.surface.height());
     let fits = |what, found: Option<(usize, usize)>| match found {
-        Some(found) if found != expected => Err(ClassifyError::Size { what, found, expected }),
+        Some(found) if found != expected => Err(Reason::Size { what, found, expected }),
         _ => Ok(()),
     };
     let above = input.above_ground;
@@ -329,7 +329,7 @@ fn check(input: &ClassifyInput<'_>) -> Result<(), ClassifyError> {
     fits("the mask of weak cells", input.weak.map(|grid| (grid.width(), grid.height())))?;
     if !(input.cell_m.is_finite() && input.cell_m > 0.0) {
         let (name, expected) = ("the side of a cell", "a positive number of metres");
-        return Err(ClassifyError::Parameter { name, found: input.cell_m, expected });
+        return Err(Reason::Parameter { name, found: input.cell_m, expected });
     }
     Ok(())
 }

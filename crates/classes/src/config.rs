@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::error::ClassifyError;
+use crate::error::{ClassifyError, Reason};
 
 /// Parameters of the classes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -80,11 +80,11 @@ impl ClassifyConfig {
     /// Checks the ranges of the parameters.
     ///
     /// # Errors
-    /// [`ClassifyError::Parameter`] for the first that is outside of its range.
+    /// [`ClassifyError`] for the first that is outside of its range.
     pub fn validate(&self) -> Result<(), ClassifyError> {
         let within = |name, found: f64, low: f64, high: f64, expected| {
             let is_good = found >= low && found <= high;
-            if is_good { Ok(()) } else { Err(ClassifyError::Parameter { name, found, expected }) }
+            if is_good { Ok(()) } else { Err(ClassifyError(Reason::Parameter { name, found, expected })) }
         };
         within("the least height of objects", self.least_height_m, 0.1, 50.0, "0.1 to 50 m")?;
         within("the side of the windows", self.window_m, 0.1, 50.0, "0.1 to 50 m")?;

@@ -2,8 +2,12 @@
 
 /// Cells that cannot be classified.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum ClassifyError {
+#[error(transparent)]
+pub struct ClassifyError(#[from] pub(crate) Reason);
+
+/// Why cells cannot be classified.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum Reason {
     /// A parameter is outside of its range.
     #[error("{name} is {found}, expected {expected}")]
     Parameter {

@@ -62,8 +62,12 @@ pub struct Split {
 
 /// Overlaps that cannot be served.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum SplitError {
+#[error(transparent)]
+pub struct SplitError(#[from] Reason);
+
+/// Why overlaps cannot be served.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+enum Reason {
     /// Fewer views see points than are to be chosen.
     #[error("{found} views see points of the model, {needed} are to be chosen")]
     TooFew {
@@ -119,25 +123,25 @@ pub fn iou(a: &[u32], b: &[u32]) -> f64 {
 /// Chooses contexts and targets; `points` is the result of [`points_of_views`].
 ///
 /// # Errors
-/// [`SplitError::Wanted`] for no contexts and overlaps outside of 0 to 1, [`SplitError::TooFew`],
-/// [`SplitError::First`].
+/// [`SplitError`] for no contexts, overlaps outside of 0 to 1, fewer views with points than are to
+/// be chosen, and a first view without points.
 pub fn split(points: &[Vec<u32>], config: &SplitConfig) -> Result<Split, SplitError> {
     let wanted = std::iter::once(config.context_iou).chain(config.target_ious.iter().copied());
     if let Some(bad) = wanted.into_iter().find(|iou| !(0.0..=1.0).contains(iou)) {
-        return Err(SplitError::Wanted { what: format!("an overlap of {bad} was asked for") });
+        return Err(Reason::Wanted { what: format!("an overlap of {bad} was asked for") }.into());
     }
     if config.contexts == 0 {
-        return Err(SplitError::Wanted { what: "no contexts were asked for".to_owned() });
+        return Err(Reason::Wanted { what: "no contexts were asked for".to_owned() }.into());
     }
     let usable: Vec<usize> = (0..points.len()).filter(|&view| !points[view].is_empty()).collect();
     let needed = config.contexts + config.target_ious.len();
     if usable.len() < needed {
-        return Err(SplitError::TooFew { found: usable.len(), needed });
+        return Err(Reason::TooFew { found: usable.len(), needed }.into());
     }
     let first = match config.first {
         Some(first) if usable.contains(&first) => first,
-        Some(view) => return Err(SplitError::First { view }),
-        None => usable.first().copied().ok_or(SplitError::TooFew { found: 0, needed })?,
+        Some(view) => return Err(Reason::First { view }.into()),
+        None => usable.first().copied().ok_or(Reason::TooFew { found: 0, needed })?,
     };
     Ok(from_first(points, usable, first, config))
 }
@@ -195,11 +199,11 @@ mod tests {
             target_ious: target_ious.to_vec(),
             ..SplitConfig::narrow()
         };
-        assert!(matches!(split(&points, &config(2, &[0.1])), Err(SplitError::TooFew { found: 2, needed: 3 })));
-        assert!(matches!(split(&points, &config(0, &[])), Err(SplitError::Wanted { .. })));
-        assert!(matches!(split(&points, &config(1, &[1.5])), Err(SplitError::Wanted { .. })));
+        assert!(matches!(split(&points, &config(2, &[0.1])), Err(SplitError(Reason::TooFew { found: 2, needed: 3 }))));
+        assert!(matches!(split(&points, &config(0, &[])), Err(SplitError(Reason::Wanted { .. }))));
+        assert!(matches!(split(&points, &config(1, &[1.5])), Err(SplitError(Reason::Wanted { .. }))));
         let first = SplitConfig { first: Some(1), ..config(1, &[0.1]) };
-        assert!(matches!(split(&points, &first), Err(SplitError::First { view: 1 })));
+        assert!(matches!(split(&points, &first), Err(SplitError(Reason::First { view: 1 }))));
         let found = split(&points, &config(1, &[0.3])).unwrap();
         assert_eq!((found.contexts[0].view, found.targets[0].view), (0, 2));
     }

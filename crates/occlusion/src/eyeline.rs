@@ -26,8 +26,12 @@ pub struct Eyeline {
 
 /// A direction that cannot be computed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum EyelineError {
+#[error(transparent)]
+pub struct EyelineError(#[from] Reason);
+
+/// Why a direction cannot be computed.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+enum Reason {
     /// The RPC fails at the grid.
     #[error("the camera model fails over the surface model: {0}")]
     Camera(#[from] CameraError),
@@ -37,6 +41,18 @@ pub enum EyelineError {
     /// A geotransform without area.
     #[error("the cells of the surface model have no area")]
     Singular,
+}
+
+impl From<CameraError> for EyelineError {
+    fn from(error: CameraError) -> Self {
+        Reason::from(error).into()
+    }
+}
+
+impl From<CrsError> for EyelineError {
+    fn from(error: CrsError) -> Self {
+        Reason::from(error).into()
+    }
 }
 
 impl Eyeline {
@@ -62,7 +78,7 @@ impl Eyeline {
                 let image = camera.project(LonLatHeight::new(lon, lat, height_m))?;
                 let above = camera.localize(image, height_m + RISE_M)?;
                 let at = projection.map_from_lonlat(above.lon_deg, above.lat_deg)?;
-                let (c, r) = geotransform.cell_from_map(at.x, at.y).ok_or(EyelineError::Singular)?;
+                let (c, r) = geotransform.cell_from_map(at.x, at.y).ok_or(Reason::Singular)?;
                 nodes[(i, j)] = [(c - column) / RISE_M, (r - row) / RISE_M];
             }
         }

@@ -55,8 +55,12 @@ pub struct Pair {
 
 /// Pairs that cannot be solved.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum BalanceError {
+#[error(transparent)]
+pub struct BalanceError(#[from] Reason);
+
+/// Why pairs cannot be solved.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+enum Reason {
     /// A pair names an image that is not there.
     #[error("a pair names image {image} of {images}")]
     Image {
@@ -100,7 +104,7 @@ struct Relation {
 pub fn balance(images: usize, reference: usize, pairs: &[Pair]) -> Result<Vec<Balance>, BalanceError> {
     let named = pairs.iter().flat_map(|p| [p.images.0, p.images.1]).chain([reference]);
     if let Some(image) = named.into_iter().find(|&image| image >= images) {
-        return Err(BalanceError::Image { image, images });
+        return Err(Reason::Image { image, images }.into());
     }
     let relations: Vec<Relation> = pairs.iter().filter_map(Relation::of).collect();
     let gains = relations.iter().filter(|r| r.alike).map(|r| (r.images, (r.spread.1 / r.spread.0).ln(), r.weight));
@@ -118,7 +122,7 @@ fn solve(
     images: usize,
     reference: usize,
     differences: impl Iterator<Item = ((usize, usize), f64, f64)>,
-) -> Result<Vec<f64>, BalanceError> {
+) -> Result<Vec<f64>, Reason> {
     let (mut normal, mut right) = (DMatrix::<f64>::zeros(images, images), DVector::<f64>::zeros(images));
     let mut total = 0.0;
     for ((i, j), d, weight) in differences {
@@ -134,7 +138,7 @@ fn solve(
     for k in 0..images {
         normal[(k, k)] += scale * if k == reference { 1e3 } else { RIDGE };
     }
-    let solution = normal.cholesky().ok_or(BalanceError::Unsolvable { images })?.solve(&right);
+    let solution = normal.cholesky().ok_or(Reason::Unsolvable { images })?.solve(&right);
     let shift = solution[reference];
     let isolated = |k: usize| right[k] == 0.0 && k != reference && solution[k].abs() < f64::MIN_POSITIVE;
     Ok((0..images).map(|k| if isolated(k) { 0.0 } else { solution[k] - shift }).collect())

@@ -5,7 +5,7 @@
 use gaussian::Splat;
 use raster::Grid;
 
-use super::scene::{check, display_range, displayed, first_splat};
+use super::scene::{Reason, check, display_range, displayed, first_splat};
 use super::{DivisionConfig, GaussianConfig, SplatConfig, SplatError, SplatSurface, divide, uniform};
 
 /// Makes splats of a surface: one per cell, or as few as `merged` allows. `picture` (red, green,
@@ -13,7 +13,7 @@ use super::{DivisionConfig, GaussianConfig, SplatConfig, SplatError, SplatSurfac
 /// colour are middle grey.
 ///
 /// # Errors
-/// [`SplatError::NoHeights`], [`SplatError::Bound`], and [`SplatError::Size`] for a picture or
+/// [`SplatError`] for a surface without heights, a bound that is not positive, and a picture or
 /// confidence of another size.
 pub fn picture_splats(
     surface: &SplatSurface<'_>,
@@ -25,7 +25,7 @@ pub fn picture_splats(
     check(surface, confidence, &SplatConfig { division, ..SplatConfig::default() })?;
     let expected = (surface.heights().width(), surface.heights().height());
     if let Some(found) = picture.map(|p| (p.width(), p.height())).filter(|found| *found != expected) {
-        return Err(SplatError::Size { what: "the picture", found, expected });
+        return Err(Reason::Size { what: "the picture", found, expected }.into());
     }
     let gaussian = GaussianConfig::default();
     let blocks = match merged {
@@ -61,7 +61,7 @@ mod tests {
         let first = splats.iter().find(|s| s.position == [0.25, -0.25, 4.0]).unwrap();
         assert_eq!((first.colour, first.opacity), ([0.0, 0.5, 1.0], 0.99));
         let other = Grid::filled(8, 7, [0.0; 3]);
-        assert!(matches!(picture_splats(&surface, Some(&other), None, None), Err(SplatError::Size { .. })));
+        assert!(matches!(picture_splats(&surface, Some(&other), None, None), Err(SplatError(Reason::Size { .. }))));
     }
 
     #[test]

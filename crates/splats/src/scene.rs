@@ -157,8 +157,12 @@ pub struct CurvePoint {
 
 /// Inputs that no splats can be made of.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum SplatError {
+#[error(transparent)]
+pub struct SplatError(#[from] pub(crate) Reason);
+
+/// Why no splats can be made.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum Reason {
     /// No cell of the surface has a height.
     #[error("the surface has no height: no splats can be made")]
     NoHeights,
@@ -194,11 +198,17 @@ pub enum SplatError {
     Geodesy(#[from] CrsError),
 }
 
+impl From<CrsError> for SplatError {
+    fn from(error: CrsError) -> Self {
+        Reason::from(error).into()
+    }
+}
+
 /// Makes splats of a surface and its images. `confidence` is per cell in 0 to 1, NaN where unknown.
 ///
 /// # Errors
-/// [`SplatError::NoHeights`], [`SplatError::Bound`], [`SplatError::Size`],
-/// [`SplatError::Elsewhere`].
+/// [`SplatError`] for a surface without heights, a bound that is not positive, a grid of another
+/// size, and an image that does not show the surface.
 pub fn make_splats(
     surface: &SplatSurface<'_>,
     confidence: Option<&Grid<f32>>,
@@ -210,7 +220,7 @@ pub fn make_splats(
     for (number, view) in (1..).zip(views) {
         let one = Seen::new(surface, view)?;
         if !one.shows.data().contains(&true) {
-            return Err(SplatError::Elsewhere { number });
+            return Err(Reason::Elsewhere { number }.into());
         }
         seen.push(one);
     }
@@ -274,20 +284,20 @@ pub(super) fn check(
     surface: &SplatSurface<'_>,
     confidence: Option<&Grid<f32>>,
     config: &SplatConfig,
-) -> Result<(), SplatError> {
+) -> Result<(), Reason> {
     let bounds = [
         ("the bound on heights", config.division.error_m),
         ("the bound on colours", config.division.colour_error),
         ("the spread", config.gaussian.spread),
     ];
     if let Some((name, value)) = bounds.into_iter().find(|(_, value)| value.is_nan() || *value <= 0.0) {
-        return Err(SplatError::Bound { name, value });
+        return Err(Reason::Bound { name, value });
     }
     let expected = (surface.heights().width(), surface.heights().height());
     match confidence.map(|c| (c.width(), c.height())) {
-        Some(found) if found != expected => Err(SplatError::Size { what: "the confidence", found, expected }),
+        Some(found) if found != expected => Err(Reason::Size { what: "the confidence", found, expected }),
         _ if surface.heights().data().iter().any(|h| h.is_finite()) => Ok(()),
-        _ => Err(SplatError::NoHeights),
+        _ => Err(Reason::NoHeights),
     }
 }
 
@@ -429,7 +439,7 @@ fn heights_report(
     splats: &[Splat],
     config: &SplatConfig,
 ) -> Result<SplatReport, SplatError> {
-    let camera = MapSplatCamera::new(surface).ok_or(SplatError::Singular)?;
+    let camera = MapSplatCamera::new(surface).ok_or(Reason::Singular)?;
     let rendering = render(splats, &camera)?;
     let height = surface.origin()[2];
     let errors = |found: &Grid<f32>| height_errors(found, surface.heights(), height);

@@ -49,8 +49,12 @@ impl Default for TsdfConfig {
 
 /// Depth maps that cannot be fused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum FusionError {
+#[error(transparent)]
+pub struct FusionError(#[from] Reason);
+
+/// Why depth maps cannot be fused.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+enum Reason {
     /// A length is not a positive number.
     #[error("the {name} is {found} m, expected more than 0")]
     Length {
@@ -91,11 +95,12 @@ pub enum FusionError {
 /// Fuses depth maps and returns the surface.
 ///
 /// # Errors
-/// [`FusionError`].
+/// [`FusionError`] for a length that is not positive, a map of another size than its camera, maps
+/// without a depth, and a volume that takes too much memory.
 pub fn fuse(views: &[DepthView<'_>], config: &TsdfConfig) -> Result<FusedMesh, FusionError> {
     for (name, found) in [("edge of a voxel", config.voxel_m), ("truncation", config.truncation_m)] {
         if !(found > 0.0 && found.is_finite()) {
-            return Err(FusionError::Length { name, found });
+            return Err(Reason::Length { name, found }.into());
         }
     }
     for (number, view) in views.iter().enumerate() {
@@ -103,10 +108,10 @@ pub fn fuse(views: &[DepthView<'_>], config: &TsdfConfig) -> Result<FusedMesh, F
         let colour = view.colour.map(|colour| [colour.width(), colour.height()]);
         let sizes = [Some([view.depth_m.width(), view.depth_m.height()]), colour];
         if let Some(found) = sizes.into_iter().flatten().find(|found| *found != expected) {
-            return Err(FusionError::Size { view: number, found, expected });
+            return Err(Reason::Size { view: number, found, expected }.into());
         }
     }
-    let origin = origin(views).ok_or(FusionError::NoDepth { views: views.len() })?;
+    let origin = origin(views).ok_or(Reason::NoDepth { views: views.len() })?;
     let fusion = Fusion { config, origin };
     let mut keys = BTreeSet::new();
     for view in views {
@@ -154,7 +159,7 @@ impl Fusion<'_> {
     }
 
     /// Adds the blocks within the truncation of the depths of a view.
-    fn add_blocks(&self, view: &DepthView<'_>, keys: &mut BTreeSet<BlockKey>) -> Result<(), FusionError> {
+    fn add_blocks(&self, view: &DepthView<'_>, keys: &mut BTreeSet<BlockKey>) -> Result<(), Reason> {
         let (width, truncation) = (view.depth_m.width(), self.config.truncation_m);
         // Half a block along the ray, also where the ray is slanted in the image.
         let steps = (4.0 * truncation / self.block_m()).ceil().max(1.0) as usize;
@@ -174,7 +179,7 @@ impl Fusion<'_> {
         for found in rows {
             keys.extend(found);
             if keys.len() > self.config.memory_bytes / BLOCK_BYTES {
-                return Err(FusionError::Memory { most: self.config.memory_bytes, voxel_m: self.config.voxel_m });
+                return Err(Reason::Memory { most: self.config.memory_bytes, voxel_m: self.config.voxel_m });
             }
         }
         Ok(())

@@ -116,6 +116,7 @@ fn normal_angle(
 
 #[cfg(test)]
 mod tests {
+    use super::super::error::Reason;
     use super::*;
 
     /// Returns a square of 10 m at a height, seen from above.
@@ -191,19 +192,19 @@ mod tests {
     fn what_cannot_be_compared_is_refused() {
         let config = SurfaceComparisonConfig::default();
         let compare = |test: &LocalSurface, config: &SurfaceComparisonConfig| {
-            compare_surfaces(test, &square(0.0), config).unwrap_err()
+            compare_surfaces(test, &square(0.0), config).unwrap_err().0
         };
         let empty = LocalSurface::Points(Vec::new());
-        assert!(matches!(compare(&empty, &config), SurfaceError::Empty { which: "test", .. }));
+        assert!(matches!(compare(&empty, &config), Reason::Empty { which: "test", .. }));
         let nan = LocalSurface::Points(vec![[0.0; 3], [0.0, f64::NAN, 0.0]]);
-        assert_eq!(compare(&nan, &config), SurfaceError::Position { which: "test", index: 1 });
+        assert_eq!(compare(&nan, &config), Reason::Position { which: "test", index: 1 });
         let corner = LocalSurface::Mesh { positions: vec![[0.0; 3]; 3], triangles: vec![[0, 1, 3]] };
-        assert_eq!(compare(&corner, &config), SurfaceError::Corner { which: "test", index: 0 });
+        assert_eq!(compare(&corner, &config), Reason::Corner { which: "test", index: 0 });
         let flat = LocalSurface::Mesh { positions: vec![[0.0; 3]; 3], triangles: vec![[0, 1, 2]] };
-        assert!(matches!(compare(&flat, &config), SurfaceError::Empty { found: "no triangle with an area", .. }));
+        assert!(matches!(compare(&flat, &config), Reason::Empty { found: "no triangle with an area", .. }));
         let zero = SurfaceComparisonConfig { voxel_m: 0.0, ..config.clone() };
-        assert!(matches!(compare(&square(0.0), &zero), SurfaceError::Setting { .. }));
+        assert!(matches!(compare(&square(0.0), &zero), Reason::Setting { .. }));
         let negative = SurfaceComparisonConfig { thresholds_m: vec![-1.0], ..config };
-        assert!(matches!(compare(&square(0.0), &negative), SurfaceError::Setting { .. }));
+        assert!(matches!(compare(&square(0.0), &negative), Reason::Setting { .. }));
     }
 }

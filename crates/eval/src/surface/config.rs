@@ -1,6 +1,6 @@
 //! Settings of the comparison of two surfaces.
 
-use super::error::SurfaceError;
+use super::error::{Reason, SurfaceError};
 
 /// Settings of the comparison of two surfaces.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -56,10 +56,10 @@ impl SurfaceComparisonConfig {
         let thresholds = self.thresholds_m.iter().map(|&t| ("a threshold", t));
         let bad = |(_, value): &(&str, f64)| !(*value > 0.0 && value.is_finite());
         if let Some((name, value)) = settings.into_iter().chain(thresholds).find(bad) {
-            return Err(SurfaceError::Setting { name, value });
+            return Err(Reason::Setting { name, value }.into());
         }
         if !(self.registration_m >= 0.0 && self.registration_m.is_finite()) {
-            return Err(SurfaceError::Setting { name: "the error of the registration", value: self.registration_m });
+            return Err(Reason::Setting { name: "the error of the registration", value: self.registration_m }.into());
         }
         Ok(())
     }

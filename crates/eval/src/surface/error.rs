@@ -2,8 +2,12 @@
 
 /// The reason why two surfaces cannot be compared.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum SurfaceError {
+#[error(transparent)]
+pub struct SurfaceError(#[from] pub(crate) Reason);
+
+/// Why two surfaces cannot be compared.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub(crate) enum Reason {
     /// A surface has no points, or no triangle with an area.
     #[error("the {which} has {found}: there is nothing to compare")]
     Empty {

@@ -9,7 +9,7 @@ use numeric::random::{GOLDEN_GAMMA, mix64};
 use rayon::prelude::*;
 
 use super::config::SurfaceComparisonConfig;
-use super::error::SurfaceError;
+use super::error::Reason;
 use super::index::{Triangle, triangles};
 use super::model::LocalSurface;
 
@@ -26,11 +26,12 @@ impl Samples {
         surface: &LocalSurface,
         config: &SurfaceComparisonConfig,
         which: &'static str,
-    ) -> Result<Self, SurfaceError> {
+    ) -> Result<Self, Reason> {
         match surface {
             LocalSurface::Points(points) => Ok(Self { points: points.clone(), normals: None, per_m2: None }),
-            LocalSurface::Mesh { .. } => on_mesh(&triangles(surface), config)
-                .ok_or(SurfaceError::Empty { which, found: "no triangle with an area" }),
+            LocalSurface::Mesh { .. } => {
+                on_mesh(&triangles(surface), config).ok_or(Reason::Empty { which, found: "no triangle with an area" })
+            }
         }
     }
 }
