@@ -13,10 +13,11 @@ use crate::forest::{forests, roughness};
 use crate::heights::Heights;
 use crate::membrane::filled;
 use crate::objects::{objects, radii};
-use crate::pits::without_pits;
+use crate::pits::pits;
 use crate::plate::plate;
 use crate::regions::quantile;
 use crate::rejoin::{PER_SLOPE_M, STEEPEST, rejoined};
+use crate::stray::{islands, stray};
 use crate::trend::{TrendConfig, trend};
 
 /// State of a cell without a height of the ground: too far from any ground.
@@ -113,38 +114,53 @@ pub fn bare_ground_of_observed(
     let side = ((WORK_CELL_M / cell_m).round() as usize).max(1);
     let work_m = cell_m * side as f64;
     progress.begin("ground", 2 * radii(config.widest_object_m / work_m).len());
-    let mut whole_m = blocks(surface, side);
+    let whole_m = blocks(surface, side);
     let noise_m = noise_of(&whole_m, work_m);
-    if whole_m.data().iter().any(|h| !h.is_nan()) {
-        whole_m = without_pits(&whole_m, &trend(&whole_m, work_m, &FIRST_TREND), work_m, noise_m);
-    }
     let observed = unobserved.map_or(Cow::Borrowed(surface), |mask| Cow::Owned(without_cells(surface, mask)));
-    let surface_m = match unobserved {
-        Some(_) => without_cells(&whole_m, &blocks(&observed, side).map(|h| h.is_nan())),
-        None => whole_m.clone(),
+    let (whole_m, surface_m) = match unobserved {
+        Some(_) => {
+            let surface_m = without_cells(&whole_m, &blocks(&observed, side).map(|h| h.is_nan()));
+            // Heights that were filled around a pit hide its rim.
+            let is_pit = pits_of(&surface_m, work_m, noise_m);
+            let whole_m = without_cells(&whole_m, &is_pit);
+            let whole_m = without_cells(&whole_m, &pits_of(&whole_m, work_m, noise_m));
+            let surface_m = without_cells(&surface_m, &whole_m.map(|h| h.is_nan()));
+            (whole_m, surface_m)
+        }
+        None => {
+            let whole_m = without_cells(&whole_m, &pits_of(&whole_m, work_m, noise_m));
+            (whole_m.clone(), whole_m)
+        }
+    };
+    // Voids of a point cloud are gaps between points, and small parts between them are usual.
+    let evidence_m = match unobserved {
+        Some(_) => without_cells(&surface_m, &islands(&surface_m, work_m)),
+        None => surface_m.clone(),
     };
     let mut found = surface_m.map(|_| false);
     let mut is_forest = forests(&whole_m, work_m, config.widest_object_m);
-    let mut clear_m = without_cells(&surface_m, &is_forest);
+    let mut clear_m = without_cells(&evidence_m, &is_forest);
     if clear_m.data().iter().all(|h| h.is_nan()) {
         // The surface is all there is to go by.
         (is_forest, clear_m) = (found.clone(), surface_m.clone());
     }
     // Without any height the raster stays unknown, and has no trend.
     if clear_m.data().iter().any(|h| !h.is_nan()) {
-        let heights = Heights { clear: &clear_m, whole: &surface_m, cell_m: work_m, noise_m };
+        let heights = Heights { clear: &clear_m, whole: &evidence_m, cell_m: work_m, noise_m };
         let first = trend(&clear_m, work_m, &FIRST_TREND);
         found = objects(&heights, (&first, &slopes(&first, work_m)), config, progress)?;
-        let known = filled(&without_cells(&clear_m, &found));
+        let known = without_cells(&clear_m, &found);
+        let known = filled(&without_cells(&known, &stray(&known, work_m, noise_m)));
         let radius = (SLOPE_HALF_WIDTH_M / work_m).round() as usize;
         let slope = slopes(&blurred(&blurred(&known, radius), radius), work_m);
         // What one of the trends hides, the other shows; ground joins again below.
         let again = objects(&heights, (&trend(&known, work_m, &SECOND_TREND), &slope), config, progress)?;
         found.data_mut().iter_mut().zip(again.data()).for_each(|(found, again)| *found |= again);
     }
-    let ground = without_ramps(&clear_m, &found, work_m, noise_m);
+    let is_stray = stray(&without_cells(&clear_m, &found), work_m, noise_m);
+    let ground = without_ramps(&without_cells(&clear_m, &is_stray), &found, work_m, noise_m);
     let noise_m = noise_of(&ground, work_m);
-    let mut ground = rejoined(&clear_m, ground, work_m, noise_m);
+    let mut ground = rejoined(&without_cells(&surface_m, &is_forest), ground, work_m, noise_m);
     let mut under = match is_forest.data().contains(&true) && ground.data().iter().any(|h| !h.is_nan()) {
         true => under_forests(&whole_m, &is_forest, &mut ground, work_m, noise_m),
         false => plate(&ground, work_m, noise_m),
@@ -152,6 +168,14 @@ pub fn bare_ground_of_observed(
     // Known ground keeps its height.
     under.data_mut().iter_mut().zip(ground.data()).filter(|(_, h)| !h.is_nan()).for_each(|(under, h)| *under = *h);
     Ok(at_cells(&observed, &ground, &under, side, config.widest_object_m / work_m))
+}
+
+/// Returns the cells of pits, none in a surface without any height, which has no trend.
+fn pits_of(surface: &Grid<f32>, cell_m: f64, noise_m: f64) -> Grid<bool> {
+    if surface.data().iter().all(|h| h.is_nan()) {
+        return surface.map(|_| false);
+    }
+    pits(surface, &trend(surface, cell_m, &FIRST_TREND), cell_m, noise_m)
 }
 
 /// Returns the heights of the ground, NaN at objects and at the ramps that lead up to them. A cell

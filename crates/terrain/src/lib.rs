@@ -2,8 +2,9 @@
 //!
 //! The method has five parts, all in metres and slopes:
 //!
-//! 1. **Pits** and **forests** are set aside: places below the ground around them, and wide areas
-//!    of rough cells between which no ground shows. Neither is evidence of the ground.
+//! 1. **Pits**, **islands** and **forests** are set aside: places below the ground around them, a
+//!    few observed cells between unobserved ones, and wide areas of rough cells between which no
+//!    ground shows. None of them is evidence of the ground.
 //! 2. **Objects** are found by morphological openings with growing windows. What vanishes at once
 //!    from a window up to 36 m wide is an object, as in the filter of Pingel et al. (2013,
 //!    <https://doi.org/10.1016/j.isprsjprs.2012.12.002>). What a wider opening removes is only a
@@ -13,8 +14,9 @@
 //!    off has no such border, and stays. The search is done twice, on the surface relative to its
 //!    trend, so that slopes do not hide low halls. The first trend follows the lower part of the
 //!    surface, the second the ground that the first search left.
-//! 3. Ground that was taken away **joins again** where it lies at the ground expected from that
-//!    around it, within a tolerance that grows with the slope.
+//! 3. What is left of objects beside the ground is taken away: small parts off the plate through
+//!    the large ones. Ground that was taken away **joins again** where it lies at the ground
+//!    expected from that around it, within a tolerance that grows with the slope.
 //! 4. The ground under objects and voids is a **thin plate** under tension through the ground
 //!    around them.
 //! 5. Under forests the plate is guided by the **tree tops**, whose height above the ground is
@@ -38,6 +40,7 @@ mod pits;
 mod plate;
 mod regions;
 mod rejoin;
+mod stray;
 mod trend;
 
 pub use config::GroundConfig;

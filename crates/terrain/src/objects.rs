@@ -22,10 +22,12 @@ const FREE_SHARE: f64 = 0.35;
 /// The same for a smooth part of an object: the other parts around it may all be higher.
 const FREE_SHARE_OF_PARTS: f64 = 0.8;
 /// Largest height from one cell to the next within a smooth part, metres: a slope of 45° and noise.
-const STEP_M: f32 = 1.5;
+pub(crate) const STEP_M: f32 = 1.5;
 /// Smallest clearing, square metres. Smaller parts of an object are steps of roofs and gaps between
 /// crowns that do not reach down to the ground.
-const CLEARING_MIN_M2: f64 = 25.0;
+pub(crate) const CLEARING_MIN_M2: f64 = 25.0;
+/// Height above the trend from which a candidate between voids is an object, metres: a storey.
+const BETWEEN_VOIDS_M: f32 = 3.0;
 
 /// Returns the cells of objects: narrow ones by how fast they vanish, wider ones by their borders,
 /// on the surface relative to `trend`. `slope` is that of the ground as far as it is known.
@@ -124,9 +126,17 @@ impl Candidates<'_> {
         let cells = regions.cells(region).iter().map(|&cell| cell as usize);
         let mut heights: Vec<f32> = cells.map(|cell| self.left.data()[cell] - self.low.data()[cell]).collect();
         let height = quantile(&mut heights, 0.5).unwrap_or(0.0);
-        // A candidate that is known only from voids around it cannot be told from ground.
-        let drop = quantile(&mut regions.drops_m(region, self.around, self.cell_m), free_share);
-        drop.is_some_and(|drop| drop >= DROP_SHARE * height)
+        match quantile(&mut regions.drops_m(region, self.around, self.cell_m), free_share) {
+            Some(drop) => drop >= DROP_SHARE * height,
+            // Between voids alone, a low candidate cannot be told from ground.
+            None => self.level_m(regions, region).is_some_and(|level| level > BETWEEN_VOIDS_M),
+        }
+    }
+
+    /// Median height of a region above the trend, metres.
+    fn level_m(&self, regions: &Regions, region: usize) -> Option<f32> {
+        let cells = regions.cells(region).iter().map(|&cell| self.left.data()[cell as usize]);
+        quantile(&mut cells.collect::<Vec<_>>(), 0.5)
     }
 }
 

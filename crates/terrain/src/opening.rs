@@ -1,4 +1,4 @@
-//! Morphological openings and closings with square windows. Voids (NaN) do not count.
+//! Morphological openings with square windows. Voids (NaN) do not count.
 //!
 //! The minimum over `n` cells of a line is made by doubling: minima over 1, 2, 4, … cells, then two
 //! of them that overlap. That takes log₂ n passes over the line, which the compiler vectorises.
@@ -25,11 +25,6 @@ pub(crate) fn lowest(surface: &Grid<f32>, radius: usize) -> Grid<f32> {
 /// Returns the highest heights over such windows.
 pub(crate) fn highest(surface: &Grid<f32>, radius: usize) -> Grid<f32> {
     lowest(&surface.map(|h| -h), radius).map(|h| -h)
-}
-
-/// Closes a surface: what is narrower than the window and lies deep is filled.
-pub(crate) fn closed(surface: &Grid<f32>, radius: usize) -> Grid<f32> {
-    opened(&surface.map(|h| -h), radius).map(|h| -h)
 }
 
 /// Returns the minima over square windows, which are cut at the borders of the grid.
@@ -118,6 +113,5 @@ mod tests {
     fn voids_stay_voids_only_without_neighbours() {
         let surface = Grid::filled(5, 5, f32::NAN);
         assert!(opened(&surface, 2).data().iter().all(|h| h.is_nan()));
-        assert!(closed(&surface, 2).data().iter().all(|h| h.is_nan()));
     }
 }

@@ -6,8 +6,8 @@
 
 use raster::Grid;
 
-use crate::coarse::difference;
-use crate::opening::closed;
+use crate::coarse::{difference, without_cells};
+use crate::opening::{highest, lowest};
 use crate::regions::{Regions, quantile};
 
 /// Half-widths of the windows that find what lies deep, metres: single cells, then patches.
@@ -27,27 +27,40 @@ const DEPTH_M: f64 = 1.5;
 /// Least depth of a pit in deviations of the noise: its bottom and its rim have noise.
 const DEPTH_DEVIATIONS: f64 = 6.0;
 
-/// Turns pits into voids; `trend` is that of the surface.
-pub(crate) fn without_pits(surface: &Grid<f32>, trend: &Grid<f32>, cell_m: f64, noise_m: f64) -> Grid<f32> {
-    let depth_m = DEPTH_M.max(DEPTH_DEVIATIONS * noise_m) as f32;
-    let mut out = surface.clone();
+/// Returns the cells of pits; `trend` is that of the surface.
+pub(crate) fn pits(surface: &Grid<f32>, trend: &Grid<f32>, cell_m: f64, noise_m: f64) -> Grid<bool> {
+    let depth_m = depth_m(noise_m);
+    let mut is_pit = surface.map(|_| false);
     for half_width_m in HALF_WIDTHS_M {
         let radius = (half_width_m / cell_m).round() as usize;
         if radius == 0 {
             continue;
         }
-        let level = difference(&out, trend);
+        let level = difference(&without_cells(surface, &is_pit), trend);
         let deep = difference(&closed(&level, radius), &level).map(|depth| *depth > depth_m);
         let regions = Regions::of(&deep);
         let most = (2.0 * half_width_m).powi(2) / (cell_m * cell_m);
         for region in 0..regions.len() {
             let cells = regions.cells(region);
             if cells.len() as f64 <= most && !is_confirmed(&level, &regions, region, depth_m, cell_m) {
-                cells.iter().for_each(|&cell| out.data_mut()[cell as usize] = f32::NAN);
+                cells.iter().for_each(|&cell| is_pit.data_mut()[cell as usize] = true);
             }
         }
     }
-    out
+    is_pit
+}
+
+/// Returns the least depth of a pit in a surface with noise, metres.
+pub(crate) fn depth_m(noise_m: f64) -> f32 {
+    DEPTH_M.max(DEPTH_DEVIATIONS * noise_m) as f32
+}
+
+/// Closes a surface: what is narrower than the window and lies deep is filled. Windows lie around
+/// cells with heights: one around a void beyond them would hold nothing but a pit at their border.
+fn closed(level: &Grid<f32>, radius: usize) -> Grid<f32> {
+    let mut high = highest(level, radius);
+    high.data_mut().iter_mut().zip(level.data()).filter(|(_, h)| h.is_nan()).for_each(|(high, _)| *high = f32::NAN);
+    lowest(&high, radius)
 }
 
 /// Whether other cells around a region lie at its level, or its rim is uneven.

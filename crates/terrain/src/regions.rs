@@ -5,6 +5,9 @@ use raster::Grid;
 /// Distance outside of a region within which the surface must have dropped, metres. Walls in
 /// satellite models are ramps of two to three metres.
 const OUTSIDE_M: f64 = 4.0;
+/// Widest void outside of a region across which the surface is looked for, metres: what a wall of
+/// 20 m hides from a view 25° off nadir.
+const GAP_M: f64 = 9.0;
 /// Distance inside of a region within which the surface must have reached its height, metres.
 const INSIDE_M: f64 = 2.0;
 /// Distance further outside and inside over which the slope across the border is measured, metres.
@@ -94,7 +97,8 @@ impl Regions {
     /// whose whole border lies at voids or at the border of the raster.
     pub(crate) fn drops_m(&self, region: usize, surface: &Grid<f32>, cell_m: f64) -> Vec<f32> {
         let steps = |metres: f64| ((metres / cell_m).round() as i64).max(1);
-        let (outside, inside, further) = (steps(OUTSIDE_M), steps(INSIDE_M), steps(FURTHER_M));
+        let (outside, gap) = (steps(OUTSIDE_M), steps(GAP_M));
+        let (inside, further) = (steps(INSIDE_M), steps(FURTHER_M));
         let (number, width) = (region as u32 + 1, surface.width());
         let at = |x: i64, y: i64| {
             (x >= 0 && y >= 0).then_some(())?;
@@ -105,8 +109,16 @@ impl Regions {
         for &cell in self.cells(region) {
             let (x, y) = ((cell as usize % width) as i64, (cell as usize / width) as i64);
             for (dx, dy) in [(1, 0), (-1, 0), (0, 1), (0, -1)] {
-                let out = (1..=outside).map_while(|k| at(x + k * dx, y + k * dy).filter(|(is_own, _)| !is_own));
-                let low = out.map(|(_, height)| height).fold(f32::NAN, f32::min);
+                let beside = |k: i64| at(x + k * dx, y + k * dy).filter(|(is_own, _)| !is_own);
+                let lowest = |start: i64| {
+                    let out = (start..start + outside).map_while(beside);
+                    out.map(|(_, height)| height).fold(f32::NAN, f32::min)
+                };
+                let mut low = lowest(1);
+                if low.is_nan() {
+                    let is_void = |k: &i64| beside(*k).is_some_and(|(_, height)| height.is_nan());
+                    low = lowest(1 + (1..=gap).take_while(is_void).count() as i64);
+                }
                 if low.is_nan() {
                     continue;
                 }

@@ -15,13 +15,13 @@ pub(crate) const PER_SLOPE_M: f32 = 1.25;
 /// Steepest slope that counts: the ramp of a wall in a surface from images is steeper.
 pub(crate) const STEEPEST: f32 = 1.0;
 /// Half-width over which the slope is measured, metres: more than the ramp of a wall.
-const SLOPE_HALF_WIDTH_M: f64 = 2.0;
+pub(crate) const SLOPE_HALF_WIDTH_M: f64 = 2.0;
 /// Rounds. Each carries the ground a few cells further up a bank; more of them climb onto roofs.
 const ROUNDS: usize = 4;
 
 /// Returns the ground with the cells of the surface that lie at it.
 pub(crate) fn rejoined(surface: &Grid<f32>, mut ground: Grid<f32>, cell_m: f64, noise_m: f64) -> Grid<f32> {
-    let level_m = LEVEL_M.max(NOISE_DEVIATIONS * noise_m) as f32;
+    let level_m = level_m(noise_m);
     let radius = (SLOPE_HALF_WIDTH_M / cell_m).round() as usize;
     for _ in 0..ROUNDS {
         let expected = plate(&ground, cell_m, noise_m);
@@ -39,4 +39,10 @@ pub(crate) fn rejoined(surface: &Grid<f32>, mut ground: Grid<f32>, cell_m: f64, 
         }
     }
     ground
+}
+
+/// Returns the distance from the expected ground within which a cell is ground where it is flat,
+/// metres.
+pub(crate) fn level_m(noise_m: f64) -> f32 {
+    LEVEL_M.max(NOISE_DEVIATIONS * noise_m) as f32
 }

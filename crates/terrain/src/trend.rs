@@ -28,11 +28,11 @@ pub(crate) struct TrendConfig {
 pub(crate) fn trend(surface: &Grid<f32>, cell_m: f64, config: &TrendConfig) -> Grid<f32> {
     let side = ((BLOCK_M / cell_m).round() as usize).max(1);
     let radius = (config.half_width_m / (cell_m * side as f64)).round().max(1.0) as usize;
-    let blocks = block_quantiles(surface, side, config.quantile);
+    let (blocks, shares) = block_quantiles(surface, side, config.quantile);
     let mut planes = blocks.clone();
     let width = planes.width();
     planes.data_mut().par_iter_mut().enumerate().for_each(|(at, height)| {
-        *height = plane_at(&blocks, (at % width, at / width), radius, config.is_lower);
+        *height = plane_at((&blocks, &shares), (at % width, at / width), radius, config.is_lower);
     });
     let planes = crate::membrane::filled(&planes);
     let mut out = surface.clone();
@@ -43,10 +43,12 @@ pub(crate) fn trend(surface: &Grid<f32>, cell_m: f64, config: &TrendConfig) -> G
     out
 }
 
-/// Returns a quantile of the heights of blocks of `side × side` cells.
-fn block_quantiles(surface: &Grid<f32>, side: usize, share: f64) -> Grid<f32> {
+/// Returns a quantile of the heights of blocks of `side × side` cells, and the share of their cells
+/// that have heights.
+fn block_quantiles(surface: &Grid<f32>, side: usize, share: f64) -> (Grid<f32>, Grid<f32>) {
     let (width, height) = (surface.width().div_ceil(side), surface.height().div_ceil(side));
     let mut blocks = Grid::filled(width, height, f32::NAN);
+    let mut shares = Grid::filled(width, height, 0.0);
     let mut values = Vec::with_capacity(side * side);
     for row in 0..height {
         for column in 0..width {
@@ -55,30 +57,38 @@ fn block_quantiles(surface: &Grid<f32>, side: usize, share: f64) -> Grid<f32> {
                 let cells = &surface.row(y)[column * side..((column + 1) * side).min(surface.width())];
                 values.extend(cells.iter().filter(|h| !h.is_nan()));
             }
+            shares[(column, row)] = values.len() as f32 / (side * side) as f32;
             blocks[(column, row)] = quantile(&mut values, share).unwrap_or(f32::NAN);
         }
     }
-    blocks
+    (blocks, shares)
 }
 
-/// Fits a plane around a block and returns its height there, NaN without blocks to fit it to.
-fn plane_at(blocks: &Grid<f32>, (column, row): (usize, usize), radius: usize, is_lower: bool) -> f32 {
+/// Fits a plane around a block and returns its height there, NaN without blocks to fit it to. A
+/// block counts by the share of its cells that have heights.
+fn plane_at(
+    (blocks, shares): (&Grid<f32>, &Grid<f32>),
+    (column, row): (usize, usize),
+    radius: usize,
+    is_lower: bool,
+) -> f32 {
     let mut points = Vec::with_capacity((2 * radius + 1).pow(2));
     for y in row.saturating_sub(radius)..(row + radius + 1).min(blocks.height()) {
         for x in column.saturating_sub(radius)..(column + radius + 1).min(blocks.width()) {
             if !blocks[(x, y)].is_nan() {
-                points.push([x as f64 - column as f64, y as f64 - row as f64, f64::from(blocks[(x, y)])]);
+                let place = [x as f64 - column as f64, y as f64 - row as f64, f64::from(blocks[(x, y)])];
+                points.push((place, f64::from(shares[(x, y)])));
             }
         }
     }
-    let Some(base) = points.first().map(|point| point[2]) else { return f32::NAN };
+    let Some(base) = points.first().map(|(place, _)| place[2]) else { return f32::NAN };
     let mut plane = [0.0; 3];
     for round in 0..if is_lower { ROUNDS } else { 1 } {
-        let weight = |&[x, y, z]: &[f64; 3]| {
+        let weight = |([x, y, z], share): ([f64; 3], f64)| {
             let above = z - base - (plane[0] + plane[1] * x + plane[2] * y);
-            if round == 0 || above <= 0.0 { 1.0 } else { 1.0 / (1.0 + (above / HALF_WEIGHT_M).powi(2)) }
+            if round == 0 || above <= 0.0 { share } else { share / (1.0 + (above / HALF_WEIGHT_M).powi(2)) }
         };
-        plane = fitted(points.iter().map(|point| (*point, weight(point))), base);
+        plane = fitted(points.iter().map(|point| (point.0, weight(*point))), base);
     }
     (base + plane[0]) as f32
 }

@@ -248,3 +248,29 @@ fn heights_that_nothing_has_measured_are_no_ground() {
     let error = bare_ground_of_observed(&cells, Some(&small), CELL_M, &GroundConfig::default(), &Silent).unwrap_err();
     assert!(error.to_string().contains("3 × 3"), "{error}");
 }
+
+/// A dense quarter on a slope as images show it: ground in some streets, roofs, and between them
+/// voids with a few wrong matches.
+#[test]
+fn wrong_matches_and_roofs_between_voids_do_not_bend_a_slope() {
+    let truth = surface(200, |x, y| 0.2 * x + 0.1 * y);
+    let is_street = |x: f32, y: f32| x < 30.0 || (y - 5.0).rem_euclid(80.0) < 10.0;
+    let is_roof = |x: f32, y: f32| (x - 85.0).rem_euclid(40.0) < 22.0 && (y - 15.0).rem_euclid(40.0) < 22.0;
+    let is_wrong = |x: f32, y: f32| x > 110.0 && (x * 7.0 + y * 3.0) % 149.0 < 1.0;
+    let cells = surface(200, |x, y| {
+        let offset = if is_street(x, y) {
+            noise(x, y, 0.1)
+        } else if is_roof(x, y) {
+            9.0
+        } else {
+            -12.0
+        };
+        0.2 * x + 0.1 * y + offset
+    });
+    let unseen =
+        surface(200, |x, y| f32::from(!(is_street(x, y) || is_roof(x, y) || is_wrong(x, y)))).map(|is| *is > 0.0);
+    let found = bare_ground_of_observed(&cells, Some(&unseen), CELL_M, &GroundConfig::default(), &Silent).unwrap();
+    assert!(rmse(&found, &truth) < 0.5, "{}", rmse(&found, &truth));
+    let roofs = share(&found, GROUND, |x, y| x > 30.0 && is_roof(x, y) && !is_street(x, y));
+    assert!(roofs < 0.02, "{roofs}");
+}
