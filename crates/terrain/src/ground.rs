@@ -149,8 +149,7 @@ pub fn bare_ground_of_observed(
         let heights = Heights { clear: &clear_m, whole: &evidence_m, cell_m: work_m, noise_m };
         let first = trend(&clear_m, work_m, &FIRST_TREND);
         found = objects(&heights, (&first, &slopes(&first, work_m)), config, progress)?;
-        let known = without_cells(&clear_m, &found);
-        let known = filled(&without_cells(&known, &stray(&known, work_m, noise_m)));
+        let known = filled(&without_cells(&clear_m, &found));
         let radius = (SLOPE_HALF_WIDTH_M / work_m).round() as usize;
         let slope = slopes(&blurred(&blurred(&known, radius), radius), work_m);
         // What one of the trends hides, the other shows; ground joins again below.
