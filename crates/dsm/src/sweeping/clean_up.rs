@@ -3,11 +3,13 @@
 //!
 //! Lengths are in metres, so that a result does not depend on the cell size more than it must.
 
+use numeric::Silent;
 use raster::{Grid, Window};
 use sweep::fusion::{
     CellSource, FillConfig, FillRule, FusedSurface, GridSight, KnownVoids, TrendConfig, TrustConfig, calibrate,
     fill_voids, ground_trend, occlusion_bounds, remove_speckle, surroundings,
 };
+use terrain::{GroundConfig, bare_ground_of_observed};
 
 use crate::config::Fill;
 
@@ -110,7 +112,11 @@ pub(crate) fn clean_up(
     };
     let above = |height_m: &Grid<f32>| combined(height_m, &trend, |height_m, ground_m| height_m - ground_m);
     let (mut above_m, completed) = (above(&fused.height_m), above(&completed));
-    let known = KnownVoids { trusted: &trusted, blind: voids.blind, completed_m: &completed };
+    let ground = match voids.fill {
+        Fill::None => trusted.map(|_| f32::NAN),
+        _ => above(&ground(&fused.height_m, &trusted, gsd_m)),
+    };
+    let known = KnownVoids { trusted: &trusted, blind: voids.blind, completed_m: &completed, ground_m: &ground };
     let filled = fill_voids(&mut above_m, known, bounds, &fill_config(voids.fill, gsd_m));
     for i in (0..above_m.data().len()).filter(|i| filled.source.data()[*i].is_filled()) {
         fused.height_m.data_mut()[i] = above_m.data()[i] + trend.data()[i];
@@ -120,6 +126,16 @@ pub(crate) fn clean_up(
     fused.confidence =
         calibrate(&fused.height_m, &fused.single_m, &mut fused.sigma_m, &fused.confidence, is_observed, &trust);
     (filled.source, before - observed)
+}
+
+/// Returns the ground under the trusted heights, metres; NaN far from any.
+fn ground(height_m: &Grid<f32>, trusted: &Grid<bool>, gsd_m: f64) -> Grid<f32> {
+    let mut seen = height_m.clone();
+    let doubted = seen.data_mut().iter_mut().zip(trusted.data()).filter(|(_, is_trusted)| !**is_trusted);
+    doubted.for_each(|(height, _)| *height = f32::NAN);
+    let unobserved = seen.map(|h| h.is_nan());
+    let found = bare_ground_of_observed(&seen, Some(&unobserved), gsd_m, &GroundConfig::default(), &Silent);
+    found.expect("the default settings are valid, and nothing cancels").heights
 }
 
 /// Returns the values that `of` makes of two grids of one size, cell by cell.

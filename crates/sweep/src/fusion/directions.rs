@@ -53,6 +53,11 @@ impl Around {
         self.across().any(|(a, b)| a.in_sight && b.in_sight)
     }
 
+    /// Returns whether two opposite heights are both `wanted`.
+    pub(super) fn is_enclosed_by(&self, wanted: impl Fn(&Known) -> bool) -> bool {
+        self.across().any(|(a, b)| wanted(&a) && wanted(&b))
+    }
+
     fn across(&self) -> impl Iterator<Item = (Known, Known)> {
         self.before.iter().zip(&self.behind).filter_map(|(a, b)| Some(((*a)?, (*b)?)))
     }

@@ -15,6 +15,9 @@
 //!   cell gets the ground.
 //!   It stays open where heights are known on one side only (water), and where the images are
 //!   blank, unless the views agree there on a roof whose rim was seen.
+//! - Where the ground is known, it takes the place of what lies near it or below it, of what is
+//!   hidden under a surface a storey higher, and of a surface that two views would have seen.
+//!   Narrow gaps between two such surfaces keep theirs.
 //! - What fewer than two views image is outside and stays open, unless it is narrow.
 //!
 //! Small islands of heights may be chance, so that nothing is filled from them.
@@ -116,6 +119,8 @@ pub struct FilledVoids {
 const KNOWN_MIN: usize = 4;
 /// A surface that is lower by a storey is another one, metres.
 const STOREY_M: f32 = 3.0;
+/// What is filled lower than this above the ground is ground, metres: half a storey.
+const ON_GROUND_M: f32 = 0.5 * STOREY_M;
 /// Number of heights among which a lower surface is looked for: those at the far end of a street.
 const CANDIDATES: usize = 64;
 /// Part of the border of a void that continues a roof in it. A blank patch over a roof and the
@@ -140,6 +145,8 @@ pub struct KnownVoids<'a> {
     /// Heights that continue what is around them in the images, and on which the views agree,
     /// where the images are blank; NaN elsewhere. Metres.
     pub completed_m: &'a Grid<f32>,
+    /// The ground, metres; NaN where it is not known.
+    pub ground_m: &'a Grid<f32>,
 }
 
 /// Fills voids of `height_m` in place. `bound_m` returns the greatest height at which each void
@@ -151,7 +158,7 @@ pub fn fill_voids(
     bound_m: impl Fn(&Grid<f32>, &[usize]) -> Vec<f32>,
     config: &FillConfig,
 ) -> FilledVoids {
-    let KnownVoids { trusted, blind, completed_m } = known;
+    let KnownVoids { trusted, blind, completed_m, ground_m } = known;
     let (width, height) = (height_m.width(), height_m.height());
     let voids: Vec<usize> = (0..height_m.data().len()).filter(|&i| height_m.data()[i].is_nan()).collect();
     let mut source = Grid::filled(width, height, CellSource::Observed);
@@ -171,8 +178,16 @@ pub fn fill_voids(
     let border = Border::new(&sources, &numbers);
     let planes = border_planes(border.cells(), count, config.same_surface_m);
     let beside_blind = beside(blind, &numbers, config.blind_reach_cells);
-    let filling =
-        Filling { numbers: &numbers, border: &border, planes: &planes, blind, beside_blind, completed_m, config };
+    let filling = Filling {
+        numbers: &numbers,
+        border: &border,
+        planes: &planes,
+        blind,
+        beside_blind,
+        completed_m,
+        ground_m,
+        config,
+    };
     let cells = voids.par_iter().zip(bounds.par_iter().zip(&around));
     let judged: Vec<Judged> = cells.map(|(&index, (&bound_m, around))| filling.judge(index, bound_m, around)).collect();
     for (&index, judged) in voids.iter().zip(judged) {
@@ -234,6 +249,7 @@ struct Filling<'a> {
     /// Void cells in and beside blind ones.
     beside_blind: Grid<bool>,
     completed_m: &'a Grid<f32>,
+    ground_m: &'a Grid<f32>,
     config: &'a FillConfig,
 }
 
@@ -254,9 +270,16 @@ impl Filling<'_> {
         // A narrow void, or one inside a plane, is a gap in what surrounds it. In another the
         // ground may be further away than the walls.
         let may_be_far = may_be_hidden && !is_under && !is_narrow && plane.is_none() && bound_m > f32::NEG_INFINITY;
+        let ground_m = self.ground_m.data()[index];
+        // Between two surfaces above the ground, a narrow void is a gap in one of them.
+        let is_gap = is_narrow && around.is_enclosed_by(|k| k.height_m > ground_m + STOREY_M);
+        let lowered = |surface: Estimate| match !is_gap && surface.height_m > ground_m + STOREY_M {
+            true => Estimate { height_m: ground_m, ..surface },
+            false => surface,
+        };
         let hidden = match lower {
-            Some(lower) if is_under => Some(lower.estimate),
-            _ if may_be_far => self.surface_under(index, bound_m),
+            Some(lower) if is_under => Some(lowered(lower.estimate)),
+            _ if may_be_far => self.surface_under(index, bound_m).map(lowered),
             _ => None,
         };
         // With no height around that would have been seen.
@@ -281,6 +304,10 @@ impl Filling<'_> {
             let below = || self.surface_below(index, lower.base_m - STOREY_M, void, count);
             Some(match plane.filter(|_| !is_blind) {
                 Some(plane) => self.on_plane(self.place(index), plane, &known),
+                // Two views would have seen the surface around.
+                None if bound_m > f32::NEG_INFINITY && lower.base_m > bound_m => {
+                    lowered(below().unwrap_or(lower.estimate))
+                }
                 None => below().unwrap_or(lower.estimate),
             })
         };
@@ -295,6 +322,10 @@ impl Filling<'_> {
             (_, Some(estimate)) => (CellSource::FilledHidden, Some(estimate)),
             _ => (if is_narrow { CellSource::FilledNarrow } else { CellSource::FilledSurface }, seen()),
         };
+        let estimate = estimate.map(|filled| match filled.height_m < ground_m + ON_GROUND_M {
+            true => Estimate { height_m: ground_m, ..filled },
+            false => filled,
+        });
         Judged { source: if estimate.is_some() { source } else { open }, estimate }
     }
 
@@ -426,7 +457,7 @@ mod tests {
     fn fill_with(height_m: &mut Grid<f32>, bound_m: f32, config: &FillConfig) -> FilledVoids {
         let blind = Grid::filled(height_m.width(), height_m.height(), false);
         let (trusted, completed_m) = (blind.map(|_| true), blind.map(|_| f32::NAN));
-        let known = KnownVoids { trusted: &trusted, blind: &blind, completed_m: &completed_m };
+        let known = KnownVoids { trusted: &trusted, blind: &blind, completed_m: &completed_m, ground_m: &completed_m };
         fill_voids(height_m, known, |_, voids| vec![bound_m; voids.len()], config)
     }
 
@@ -502,7 +533,7 @@ mod tests {
         assert!((10..20).all(|x| (10..20).all(|y| seen[(x, y)] == 1.0)), "{:?}", seen.row(15));
         let visible = |_: &Grid<f32>, voids: &[usize]| vec![f32::NEG_INFINITY; voids.len()];
         let (trusted, completed_m) = (blind.map(|_| true), blind.map(|_| f32::NAN));
-        let known = KnownVoids { trusted: &trusted, blind: &blind, completed_m: &completed_m };
+        let known = KnownVoids { trusted: &trusted, blind: &blind, completed_m: &completed_m, ground_m: &completed_m };
         let found = fill_voids(&mut unseen, known, visible, &CONFIG);
         assert!((12..20).all(|x| unseen[(x, 15)].is_nan()) && unseen[(10, 15)] == 1.0, "{:?}", unseen.row(15));
         assert_eq!(found.source[(15, 15)], CellSource::Blank);
@@ -519,10 +550,11 @@ mod tests {
         (10..20).for_each(|x| (10..20).for_each(|y| roof[(x, y)] = f32::NAN));
         (30..36).for_each(|x| (30..36).for_each(|y| roof[(x, y)] = f32::NAN));
         let (blind, trusted) = (roof.map(|h| h.is_nan()), roof.map(|_| true));
+        let nowhere = roof.map(|_| f32::NAN);
         for (at, height_m, is_completed) in [((15, 15), 6.4, true), ((15, 15), 16.0, false), ((33, 33), 1.0, false)] {
             let mut completed_m = roof.map(|_| f32::NAN);
             completed_m[at] = height_m;
-            let known = KnownVoids { trusted: &trusted, blind: &blind, completed_m: &completed_m };
+            let known = KnownVoids { trusted: &trusted, blind: &blind, completed_m: &completed_m, ground_m: &nowhere };
             let mut filled = roof.clone();
             let config = FillConfig { narrow_cells: 3.0, ..CONFIG };
             let found = fill_voids(&mut filled, known, |_, voids| vec![f32::NEG_INFINITY; voids.len()], &config);
@@ -561,7 +593,8 @@ mod tests {
         let trusted = g.map(|_| true);
         let completed_m = g.map(|_| f32::NAN);
         let filled = |blind: Grid<bool>| {
-            let known = KnownVoids { trusted: &trusted, blind: &blind, completed_m: &completed_m };
+            let known =
+                KnownVoids { trusted: &trusted, blind: &blind, completed_m: &completed_m, ground_m: &completed_m };
             let mut filled = g.clone();
             let source = fill_voids(&mut filled, known, |_, voids| vec![10.0; voids.len()], &CONFIG).source;
             let is_hidden = |i: usize| source.data()[i] == CellSource::FilledHidden;
@@ -585,5 +618,31 @@ mod tests {
         let found = fill(&mut g);
         assert!((18..22).all(|x| g[(x, 20)] == 9.0) && g[(17, 20)].is_nan(), "{:?}", g.row(20));
         assert!((14..26).all(|x| (14..26).all(|y| !found.source[(x, y)].is_filled())));
+    }
+
+    /// A street 14 m wide between roofs at 20 m, with ground at 2 m under it.
+    #[test]
+    fn ground_fills_a_street_that_two_views_would_have_seen_and_no_narrow_gap_of_a_roof() {
+        let filled = |width: usize, roofs_m: [f32; 2], ground_m: f32, bound_m: f32| {
+            let mut height_m = Grid::filled(60, 40, roofs_m[0]);
+            for y in 0..40 {
+                let row = height_m.row_mut(y);
+                row[20 + width..].fill(roofs_m[1]);
+                row[20..20 + width].fill(f32::NAN);
+            }
+            let blind = height_m.map(|_| false);
+            let (trusted, completed_m) = (blind.map(|_| true), blind.map(|_| f32::NAN));
+            let ground_m = blind.map(|_| ground_m);
+            let known = KnownVoids { trusted: &trusted, blind: &blind, completed_m: &completed_m, ground_m: &ground_m };
+            let config = FillConfig { reach_cells: 20, ..CONFIG };
+            let found = fill_voids(&mut height_m, known, |_, voids| vec![bound_m; voids.len()], &config);
+            (height_m[(20 + width / 2, 20)], found.source[(20 + width / 2, 20)])
+        };
+        let unknown = f32::NAN;
+        assert_eq!(filled(14, [20.0, 27.0], 2.0, 10.0), (2.0, CellSource::FilledSurface));
+        assert!(filled(14, [20.0, 27.0], unknown, 10.0).0 >= 20.0);
+        assert_eq!(filled(14, [20.0, 27.0], 2.0, 30.0), (2.0, CellSource::FilledHidden));
+        assert!(filled(4, [20.0, 20.0], 2.0, 10.0).0 >= 20.0);
+        assert_eq!(filled(4, [1.0, -9.0], 2.0, f32::NEG_INFINITY).0, 2.0);
     }
 }
