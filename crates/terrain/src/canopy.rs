@@ -183,7 +183,7 @@ fn smoothed(heights: &Grid<f32>, radius: usize) -> Grid<f32> {
 }
 
 /// Returns the distance of each cell to the nearest known cell, metres, by steps of 1 and √2 cells.
-fn distances_m(known: &Grid<f32>, cell_m: f64) -> Grid<f32> {
+pub(crate) fn distances_m(known: &Grid<f32>, cell_m: f64) -> Grid<f32> {
     let (width, height) = (known.width(), known.height());
     let (straight, slanted) = (cell_m as f32, cell_m as f32 * std::f32::consts::SQRT_2);
     let mut out = known.map(|h| if h.is_nan() { f32::INFINITY } else { 0.0 });

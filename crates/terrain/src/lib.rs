@@ -14,9 +14,9 @@
 //!    off has no such border, and stays. The search is done twice, on the surface relative to its
 //!    trend, so that slopes do not hide low halls. The first trend follows the lower part of the
 //!    surface, the second the ground that the first search left.
-//! 3. What is left of objects beside the ground is taken away: small parts off the plate through
-//!    the large ones. Ground that was taken away **joins again** where it lies at the ground
-//!    expected from that around it, within a tolerance that grows with the slope.
+//! 3. What is left of objects is taken away: small parts off the plate through the large ones, and
+//!    parts a storey above the largest. Ground that was taken away **joins again** where it lies at
+//!    the ground expected from that around it, within a tolerance that grows with the slope.
 //! 4. The ground under objects and voids is a **thin plate** under tension through the ground
 //!    around them.
 //! 5. Under forests the plate is guided by the **tree tops**, whose height above the ground is
