@@ -620,14 +620,17 @@ mod tests {
         assert!((14..26).all(|x| (14..26).all(|y| !found.source[(x, y)].is_filled())));
     }
 
-    /// A street 14 m wide between roofs at 20 m, with ground at 2 m under it.
+    /// A void between the roofs of two rows of houses, every other one of which is 6 m higher, and
+    /// the ground under it.
     #[test]
     fn ground_fills_a_street_that_two_views_would_have_seen_and_no_narrow_gap_of_a_roof() {
         let filled = |width: usize, roofs_m: [f32; 2], ground_m: f32, bound_m: f32| {
-            let mut height_m = Grid::filled(60, 40, roofs_m[0]);
+            let mut height_m = Grid::filled(60, 40, 0.0);
             for y in 0..40 {
+                let higher_m = if y / 10 % 2 == 0 { 0.0 } else { 6.0 };
                 let row = height_m.row_mut(y);
-                row[20 + width..].fill(roofs_m[1]);
+                row[..20].fill(roofs_m[0] + higher_m);
+                row[20 + width..].fill(roofs_m[1] - higher_m);
                 row[20..20 + width].fill(f32::NAN);
             }
             let blind = height_m.map(|_| false);
@@ -640,9 +643,9 @@ mod tests {
         };
         let unknown = f32::NAN;
         assert_eq!(filled(14, [20.0, 27.0], 2.0, 10.0), (2.0, CellSource::FilledSurface));
-        assert!(filled(14, [20.0, 27.0], unknown, 10.0).0 >= 20.0);
+        assert!(filled(14, [20.0, 27.0], unknown, 10.0).0 >= 14.0);
         assert_eq!(filled(14, [20.0, 27.0], 2.0, 30.0), (2.0, CellSource::FilledHidden));
-        assert!(filled(4, [20.0, 20.0], 2.0, 10.0).0 >= 20.0);
-        assert_eq!(filled(4, [1.0, -9.0], 2.0, f32::NEG_INFINITY).0, 2.0);
+        assert!(filled(4, [20.0, 26.0], 2.0, 10.0).0 >= 20.0);
+        assert_eq!(filled(4, [-9.0, 1.0], 2.0, f32::NEG_INFINITY).0, 2.0);
     }
 }
