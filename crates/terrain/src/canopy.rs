@@ -14,7 +14,7 @@
 
 use raster::Grid;
 
-use crate::coarse::{blurred, difference, widened, without_cells};
+use crate::coarse::{blurred, difference, distances_m, widened, without_cells};
 use crate::opening::{highest, lowest};
 use crate::plate::plate;
 use crate::regions::{Regions, quantile};
@@ -180,48 +180,4 @@ fn smoothed(heights: &Grid<f32>, radius: usize) -> Grid<f32> {
     let cells =
         sum.data().iter().zip(count.data()).map(|(sum, count)| if *count > 1e-3 { sum / count } else { f32::NAN });
     Grid::from_vec(heights.width(), heights.height(), cells.collect()).expect("one mean per cell")
-}
-
-/// Returns the distance of each cell to the nearest known cell, metres, by steps of 1 and √2 cells.
-pub(crate) fn distances_m(known: &Grid<f32>, cell_m: f64) -> Grid<f32> {
-    let (width, height) = (known.width(), known.height());
-    let (straight, slanted) = (cell_m as f32, cell_m as f32 * std::f32::consts::SQRT_2);
-    let mut out = known.map(|h| if h.is_nan() { f32::INFINITY } else { 0.0 });
-    for row in 0..height {
-        for column in 0..width {
-            let mut least = out[(column, row)];
-            if column > 0 {
-                least = least.min(out[(column - 1, row)] + straight);
-            }
-            if row > 0 {
-                least = least.min(out[(column, row - 1)] + straight);
-                if column > 0 {
-                    least = least.min(out[(column - 1, row - 1)] + slanted);
-                }
-                if column + 1 < width {
-                    least = least.min(out[(column + 1, row - 1)] + slanted);
-                }
-            }
-            out[(column, row)] = least;
-        }
-    }
-    for row in (0..height).rev() {
-        for column in (0..width).rev() {
-            let mut least = out[(column, row)];
-            if column + 1 < width {
-                least = least.min(out[(column + 1, row)] + straight);
-            }
-            if row + 1 < height {
-                least = least.min(out[(column, row + 1)] + straight);
-                if column + 1 < width {
-                    least = least.min(out[(column + 1, row + 1)] + slanted);
-                }
-                if column > 0 {
-                    least = least.min(out[(column - 1, row + 1)] + slanted);
-                }
-            }
-            out[(column, row)] = least;
-        }
-    }
-    out
 }

@@ -107,3 +107,47 @@ pub(crate) fn widened(mask: &Grid<bool>, radius: usize) -> Grid<bool> {
     let least = 0.5 / ((2 * radius + 1) as f32).powi(2);
     shares.map(|&share| share > least)
 }
+
+/// Returns the distance of each cell to the nearest known cell, metres, by steps of 1 and √2 cells.
+pub(crate) fn distances_m(known: &Grid<f32>, cell_m: f64) -> Grid<f32> {
+    let (width, height) = (known.width(), known.height());
+    let (straight, slanted) = (cell_m as f32, cell_m as f32 * std::f32::consts::SQRT_2);
+    let mut out = known.map(|h| if h.is_nan() { f32::INFINITY } else { 0.0 });
+    for row in 0..height {
+        for column in 0..width {
+            let mut least = out[(column, row)];
+            if column > 0 {
+                least = least.min(out[(column - 1, row)] + straight);
+            }
+            if row > 0 {
+                least = least.min(out[(column, row - 1)] + straight);
+                if column > 0 {
+                    least = least.min(out[(column - 1, row - 1)] + slanted);
+                }
+                if column + 1 < width {
+                    least = least.min(out[(column + 1, row - 1)] + slanted);
+                }
+            }
+            out[(column, row)] = least;
+        }
+    }
+    for row in (0..height).rev() {
+        for column in (0..width).rev() {
+            let mut least = out[(column, row)];
+            if column + 1 < width {
+                least = least.min(out[(column + 1, row)] + straight);
+            }
+            if row + 1 < height {
+                least = least.min(out[(column, row + 1)] + straight);
+                if column + 1 < width {
+                    least = least.min(out[(column + 1, row + 1)] + slanted);
+                }
+                if column > 0 {
+                    least = least.min(out[(column - 1, row + 1)] + slanted);
+                }
+            }
+            out[(column, row)] = least;
+        }
+    }
+    out
+}

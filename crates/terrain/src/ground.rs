@@ -117,25 +117,22 @@ pub fn bare_ground_of_observed(
     let whole_m = blocks(surface, side);
     let noise_m = noise_of(&whole_m, work_m);
     let observed = unobserved.map_or(Cow::Borrowed(surface), |mask| Cow::Owned(without_cells(surface, mask)));
-    let (whole_m, surface_m) = match unobserved {
+    let without_pits = |heights: &Grid<f32>| without_cells(heights, &pits_of(heights, work_m, noise_m));
+    let (whole_m, surface_m, evidence_m) = match unobserved {
         Some(_) => {
-            let surface_m = without_cells(&whole_m, &blocks(&observed, side).map(|h| h.is_nan()));
+            let is_void = blocks(&observed, side).map(|h| h.is_nan());
             // Heights that were filled around a pit hide its rim.
-            let is_pit = pits_of(&surface_m, work_m, noise_m);
-            let whole_m = without_cells(&whole_m, &is_pit);
-            let whole_m = without_cells(&whole_m, &pits_of(&whole_m, work_m, noise_m));
-            let surface_m = without_cells(&surface_m, &whole_m.map(|h| h.is_nan()));
-            (whole_m, surface_m)
+            let is_pit = pits_of(&without_cells(&whole_m, &is_void), work_m, noise_m);
+            let whole_m = without_pits(&without_cells(&whole_m, &is_pit));
+            let surface_m = without_cells(&whole_m, &is_void);
+            let evidence_m = without_cells(&surface_m, &islands(&surface_m, work_m));
+            (whole_m, surface_m, evidence_m)
         }
+        // Voids between the points of a cloud are usual, and make no islands.
         None => {
-            let whole_m = without_cells(&whole_m, &pits_of(&whole_m, work_m, noise_m));
-            (whole_m.clone(), whole_m)
+            let whole_m = without_pits(&whole_m);
+            (whole_m.clone(), whole_m.clone(), whole_m)
         }
-    };
-    // Voids of a point cloud are gaps between points, and small parts between them are usual.
-    let evidence_m = match unobserved {
-        Some(_) => without_cells(&surface_m, &islands(&surface_m, work_m)),
-        None => surface_m.clone(),
     };
     let mut found = surface_m.map(|_| false);
     let mut is_forest = forests(&whole_m, work_m, config.widest_object_m);

@@ -26,8 +26,8 @@ pub(crate) const STEP_M: f32 = 1.5;
 /// Smallest clearing, square metres. Smaller parts of an object are steps of roofs and gaps between
 /// crowns that do not reach down to the ground.
 pub(crate) const CLEARING_MIN_M2: f64 = 25.0;
-/// Height above the trend from which a candidate between voids is an object, metres: a storey.
-const BETWEEN_VOIDS_M: f32 = 3.0;
+/// Height from which what has only voids beside it stands on the ground, metres: a storey.
+pub(crate) const STOREY_M: f32 = 3.0;
 
 /// Returns the cells of objects: narrow ones by how fast they vanish, wider ones by their borders,
 /// on the surface relative to `trend`. `slope` is that of the ground as far as it is known.
@@ -123,20 +123,12 @@ fn judge(candidates: &Candidates<'_>, found: &mut Grid<bool>) -> Grid<bool> {
 impl Candidates<'_> {
     /// Whether the surface drops by the height of a region along its border, except for a share.
     fn drops(&self, regions: &Regions, region: usize, free_share: f64) -> bool {
-        let cells = regions.cells(region).iter().map(|&cell| cell as usize);
-        let mut heights: Vec<f32> = cells.map(|cell| self.left.data()[cell] - self.low.data()[cell]).collect();
-        let height = quantile(&mut heights, 0.5).unwrap_or(0.0);
+        let height = regions.median(region, |cell| self.left.data()[cell] - self.low.data()[cell]).unwrap_or(0.0);
         match quantile(&mut regions.drops_m(region, self.around, self.cell_m), free_share) {
             Some(drop) => drop >= DROP_SHARE * height,
             // Between voids alone, a low candidate cannot be told from ground.
-            None => self.level_m(regions, region).is_some_and(|level| level > BETWEEN_VOIDS_M),
+            None => regions.median(region, |cell| self.left.data()[cell]).is_some_and(|above| above > STOREY_M),
         }
-    }
-
-    /// Median height of a region above the trend, metres.
-    fn level_m(&self, regions: &Regions, region: usize) -> Option<f32> {
-        let cells = regions.cells(region).iter().map(|&cell| self.left.data()[cell as usize]);
-        quantile(&mut cells.collect::<Vec<_>>(), 0.5)
     }
 }
 

@@ -40,12 +40,10 @@ pub(crate) fn pits(surface: &Grid<f32>, trend: &Grid<f32>, cell_m: f64, noise_m:
         let deep = difference(&closed(&level, radius), &level).map(|depth| *depth > depth_m);
         let regions = Regions::of(&deep);
         let most = (2.0 * half_width_m).powi(2) / (cell_m * cell_m);
-        for region in 0..regions.len() {
-            let cells = regions.cells(region);
-            if cells.len() as f64 <= most && !is_confirmed(&level, &regions, region, depth_m, cell_m) {
-                cells.iter().for_each(|&cell| is_pit.data_mut()[cell as usize] = true);
-            }
-        }
+        let found = regions.mask(|region| {
+            regions.cells(region).len() as f64 <= most && !is_confirmed(&level, &regions, region, depth_m, cell_m)
+        });
+        is_pit.data_mut().iter_mut().zip(found.data()).for_each(|(is_pit, found)| *is_pit |= found);
     }
     is_pit
 }
@@ -65,17 +63,17 @@ fn closed(level: &Grid<f32>, radius: usize) -> Grid<f32> {
 
 /// Whether other cells around a region lie at its level, or its rim is uneven.
 fn is_confirmed(level: &Grid<f32>, regions: &Regions, region: usize, depth_m: f32, cell_m: f64) -> bool {
-    let cells = regions.cells(region);
-    let mut heights: Vec<f32> = cells.iter().map(|&cell| level.data()[cell as usize]).collect();
-    let Some(own) = quantile(&mut heights, 0.5) else { return true };
+    let Some(own) = regions.median(region, |cell| level.data()[cell]) else { return true };
     // Crowns and roofs around a gap differ in height; the ground around a pit does not.
     let steps = |metres: f64| ((metres / cell_m).round() as usize).max(1);
-    let mut rim = rim(level, regions, region, steps(RIM_M));
+    let rim = regions.around(region, steps(RIM_M)).filter(|&cell| !regions.is_any(cell));
+    let mut rim: Vec<f32> = rim.map(|cell| level.data()[cell as usize]).filter(|height| !height.is_nan()).collect();
     let Some(middle_m) = quantile(&mut rim, 0.5) else { return true };
     let spread_m = quantile(&mut rim, 0.9).unwrap_or(0.0) - quantile(&mut rim, 0.1).unwrap_or(0.0);
     if spread_m > RIM_SHARE * (middle_m - own) {
         return true;
     }
+    let cells = regions.cells(region);
     let middle = cells[cells.len() / 2] as usize;
     let (column, row) = (middle % level.width(), middle / level.width());
     let (reach, spacing) = (steps(REACH_M), steps(SPACING_M));
@@ -90,25 +88,4 @@ fn is_confirmed(level: &Grid<f32>, regions: &Regions, region: usize, depth_m: f3
         }
     }
     f64::from(agree) >= CONFIRMED_SHARE * f64::from(count)
-}
-
-/// Heights of the cells around a region that belong to no region.
-fn rim(level: &Grid<f32>, regions: &Regions, region: usize, radius: usize) -> Vec<f32> {
-    let (width, height) = (level.width(), level.height());
-    let mut out = Vec::new();
-    for &cell in regions.cells(region) {
-        let (column, row) = (cell as usize % width, cell as usize / width);
-        let mut add = |x: usize, y: usize| {
-            if x < width && y < height && !regions.is_any((y * width + x) as u32) && !level[(x, y)].is_nan() {
-                out.push(level[(x, y)]);
-            }
-        };
-        for step in 1..=radius {
-            add(column + step, row);
-            add(column.wrapping_sub(step), row);
-            add(column, row + step);
-            add(column, row.wrapping_sub(step));
-        }
-    }
-    out
 }

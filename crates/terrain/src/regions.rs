@@ -93,6 +93,34 @@ impl Regions {
         self.numbers.data()[cell as usize] as usize - 1
     }
 
+    /// The median over the cells of a region.
+    pub(crate) fn median(&self, region: usize, of: impl Fn(usize) -> f32) -> Option<f32> {
+        let mut values: Vec<f32> = self.cells(region).iter().map(|&cell| of(cell as usize)).collect();
+        quantile(&mut values, 0.5)
+    }
+
+    /// Marks the cells of the regions that are `chosen`.
+    pub(crate) fn mask(&self, chosen: impl Fn(usize) -> bool) -> Grid<bool> {
+        let mut mask = self.numbers.map(|_| false);
+        for region in (0..self.len()).filter(|region| chosen(*region)) {
+            self.cells(region).iter().for_each(|&cell| mask.data_mut()[cell as usize] = true);
+        }
+        mask
+    }
+
+    /// The cells up to `reach` cells beside those of a region, along rows and columns. Those that
+    /// lie beside several cells of it come several times.
+    pub(crate) fn around(&self, region: usize, reach: usize) -> impl Iterator<Item = u32> {
+        let (width, height) = (self.numbers.width(), self.numbers.height());
+        let beside = move |&cell: &u32| {
+            let (column, row) = (cell as usize % width, cell as usize / width);
+            let columns = (column.saturating_sub(reach)..(column + reach + 1).min(width)).map(move |x| (x, row));
+            let rows = (row.saturating_sub(reach)..(row + reach + 1).min(height)).map(move |y| (column, y));
+            columns.chain(rows).map(move |(x, y)| (y * width + x) as u32)
+        };
+        self.cells(region).iter().flat_map(beside).filter(move |&cell| !self.holds(region, cell))
+    }
+
     /// Heights by which the surface drops along the border of a region, metres. Empty for a region
     /// whose whole border lies at voids or at the border of the raster.
     pub(crate) fn drops_m(&self, region: usize, surface: &Grid<f32>, cell_m: f64) -> Vec<f32> {

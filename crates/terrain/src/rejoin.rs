@@ -15,20 +15,19 @@ pub(crate) const PER_SLOPE_M: f32 = 1.25;
 /// Steepest slope that counts: the ramp of a wall in a surface from images is steeper.
 pub(crate) const STEEPEST: f32 = 1.0;
 /// Half-width over which the slope is measured, metres: more than the ramp of a wall.
-pub(crate) const SLOPE_HALF_WIDTH_M: f64 = 2.0;
+const SLOPE_HALF_WIDTH_M: f64 = 2.0;
 /// Rounds. Each carries the ground a few cells further up a bank; more of them climb onto roofs.
 const ROUNDS: usize = 4;
 
 /// Returns the ground with the cells of the surface that lie at it.
 pub(crate) fn rejoined(surface: &Grid<f32>, mut ground: Grid<f32>, cell_m: f64, noise_m: f64) -> Grid<f32> {
     let level_m = level_m(noise_m);
-    let radius = (SLOPE_HALF_WIDTH_M / cell_m).round() as usize;
     for _ in 0..ROUNDS {
         let expected = plate(&ground, cell_m, noise_m);
-        let slope = slopes(&blurred(&expected, radius), cell_m);
+        let growth_m = growth_m(&expected, cell_m);
         let mut has_grown = false;
         for (at, cell) in ground.data_mut().iter_mut().enumerate().filter(|(_, cell)| cell.is_nan()) {
-            let reach_m = level_m + PER_SLOPE_M * slope.data()[at].min(STEEPEST);
+            let reach_m = level_m + growth_m.data()[at];
             if (surface.data()[at] - expected.data()[at]).abs() <= reach_m {
                 *cell = surface.data()[at];
                 has_grown = true;
@@ -45,4 +44,10 @@ pub(crate) fn rejoined(surface: &Grid<f32>, mut ground: Grid<f32>, cell_m: f64, 
 /// metres.
 pub(crate) fn level_m(noise_m: f64) -> f32 {
     LEVEL_M.max(NOISE_DEVIATIONS * noise_m) as f32
+}
+
+/// Returns the growth of that distance by the slope of the expected ground, metres.
+pub(crate) fn growth_m(expected: &Grid<f32>, cell_m: f64) -> Grid<f32> {
+    let radius = (SLOPE_HALF_WIDTH_M / cell_m).round() as usize;
+    slopes(&blurred(expected, radius), cell_m).map(|slope| PER_SLOPE_M * slope.min(STEEPEST))
 }

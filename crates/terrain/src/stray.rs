@@ -6,57 +6,37 @@
 
 use raster::Grid;
 
-use crate::canopy::distances_m;
-use crate::coarse::{blurred, difference, slopes, without_cells};
-use crate::objects::{CLEARING_MIN_M2, STEP_M};
+use crate::coarse::{difference, distances_m, without_cells};
+use crate::objects::{CLEARING_MIN_M2, STEP_M, STOREY_M};
 use crate::pits::depth_m;
 use crate::plate::plate;
-use crate::regions::{Regions, quantile};
-use crate::rejoin::{PER_SLOPE_M, SLOPE_HALF_WIDTH_M, STEEPEST, level_m};
+use crate::regions::Regions;
+use crate::rejoin::{growth_m, level_m};
 
 /// Width of the surroundings of a part that tell whether it lies between voids, cells.
-const SURROUNDINGS: isize = 3;
-
-/// Height above most of the ground from which a part is none, metres: a storey.
-const STOREY_M: f32 = 3.0;
-/// Growth of that height with the distance, metres per metre: a slope of 11° that begins beyond the
-/// other ground.
+const SURROUNDINGS: usize = 3;
+/// Growth with the distance of the height from which a part stands above the largest one, metres
+/// per metre: a slope of 11° that begins beyond the largest part.
 const STOREY_PER_M: f32 = 0.2;
 
 /// Returns the cells of islands: small parts of a surface with more voids than heights around them.
 pub(crate) fn islands(surface: &Grid<f32>, cell_m: f64) -> Grid<bool> {
-    let parts = Parts::of(surface, cell_m);
-    parts.mask(|part| parts.is_small(part) && parts.is_between_voids(part))
+    let parts = parts(surface, cell_m);
+    let is_between_voids = |part: usize| {
+        let is_void = parts.around(part, SURROUNDINGS).map(|cell| surface.data()[cell as usize].is_nan());
+        let (voids, cells) = is_void.fold((0, 0), |(voids, cells), is| (voids + usize::from(is), cells + 1));
+        2 * voids > cells
+    };
+    parts.mask(|part| is_small(&parts, part, cell_m) && is_between_voids(part))
 }
 
 /// Returns the cells of the stray parts of a ground with NaN at everything else: small ones off the
-/// ground around them, and others that stand above most of the ground.
+/// ground around them, and others that stand above the largest one.
 pub(crate) fn stray(ground: &Grid<f32>, cell_m: f64, noise_m: f64) -> Grid<bool> {
     let mut is_stray = small_strays(ground, cell_m, noise_m);
     let raised = raised(&without_cells(ground, &is_stray), cell_m, noise_m);
     is_stray.data_mut().iter_mut().zip(raised.data()).for_each(|(is_stray, raised)| *is_stray |= raised);
     is_stray
-}
-
-/// Returns the cells of parts that stand above the ground of the largest one. Where it is less than
-/// half of the ground, as in a dense quarter, nothing tells which parts are ground.
-fn raised(ground: &Grid<f32>, cell_m: f64, noise_m: f64) -> Grid<bool> {
-    let parts = Parts::of(ground, cell_m);
-    let size = |part: &usize| parts.regions.cells(*part).len();
-    let nowhere = ground.map(|_| false);
-    let Some(largest) = (0..parts.regions.len()).max_by_key(size) else { return nowhere };
-    let known = ground.data().iter().filter(|h| !h.is_nan()).count();
-    if size(&largest) == known || 2 * size(&largest) < known {
-        return nowhere;
-    }
-    let main = without_cells(ground, &parts.mask(|part| part != largest));
-    let offset = difference(ground, &plate(&main, cell_m, noise_m));
-    let distance = distances_m(&main, cell_m);
-    parts.mask(|part| {
-        let cells = parts.regions.cells(part).iter().map(|&cell| cell as usize);
-        let mut raised: Vec<f32> = cells.map(|at| offset.data()[at] - STOREY_PER_M * distance.data()[at]).collect();
-        part != largest && quantile(&mut raised, 0.5).is_some_and(|raised_m| raised_m > STOREY_M)
-    })
 }
 
 /// Returns the cells of small parts off the ground.
@@ -65,69 +45,45 @@ fn raised(ground: &Grid<f32>, cell_m: f64, noise_m: f64) -> Grid<bool> {
 /// join the ground as every other cell does. What lies below it may be a yard, and is stray from
 /// the depth of a pit on.
 fn small_strays(ground: &Grid<f32>, cell_m: f64, noise_m: f64) -> Grid<bool> {
-    let parts = Parts::of(ground, cell_m);
-    let large = without_cells(ground, &parts.mask(|part| parts.is_small(part)));
+    let parts = parts(ground, cell_m);
+    let large = without_cells(ground, &parts.mask(|part| is_small(&parts, part, cell_m)));
     if large.data().iter().all(|h| h.is_nan()) {
         return ground.map(|_| false);
     }
     let expected = plate(&large, cell_m, noise_m);
-    let slope = slopes(&blurred(&expected, (SLOPE_HALF_WIDTH_M / cell_m).round() as usize), cell_m);
+    let growth_m = growth_m(&expected, cell_m);
     let offset = difference(ground, &expected);
-    parts.mask(|part| {
-        let cells = parts.regions.cells(part);
-        let mut offsets: Vec<f32> = cells.iter().map(|&cell| offset.data()[cell as usize]).collect();
-        let offset_m = quantile(&mut offsets, 0.5).unwrap_or(0.0);
+    let is_off = |part: usize| {
+        let offset_m = parts.median(part, |cell| offset.data()[cell]).unwrap_or(0.0);
         let allowed_m = if offset_m > 0.0 { level_m(noise_m) } else { depth_m(noise_m) };
-        let slope = slope.data()[cells[cells.len() / 2] as usize].min(STEEPEST);
-        parts.is_small(part) && offset_m.abs() > allowed_m + PER_SLOPE_M * slope
-    })
+        let cells = parts.cells(part);
+        offset_m.abs() > allowed_m + growth_m.data()[cells[cells.len() / 2] as usize]
+    };
+    parts.mask(|part| is_small(&parts, part, cell_m) && is_off(part))
 }
 
-/// The parts of a surface without steps.
-struct Parts<'a> {
-    surface: &'a Grid<f32>,
-    regions: Regions,
-    cell_m: f64,
+/// Returns the cells of parts that stand above the ground of the largest one. Where it is less than
+/// half of the ground, as in a dense quarter, nothing tells which parts are ground.
+fn raised(ground: &Grid<f32>, cell_m: f64, noise_m: f64) -> Grid<bool> {
+    let parts = parts(ground, cell_m);
+    let size = |part: &usize| parts.cells(*part).len();
+    let known = ground.data().iter().filter(|h| !h.is_nan()).count();
+    let largest = (0..parts.len()).max_by_key(size).filter(|part| size(part) < known && 2 * size(part) >= known);
+    let Some(largest) = largest else { return ground.map(|_| false) };
+    let main = without_cells(ground, &parts.mask(|part| part != largest));
+    let offset = difference(ground, &plate(&main, cell_m, noise_m));
+    let distance = distances_m(&main, cell_m);
+    let above_m = |part: usize| parts.median(part, |cell| offset.data()[cell] - STOREY_PER_M * distance.data()[cell]);
+    parts.mask(|part| part != largest && above_m(part).is_some_and(|above_m| above_m > STOREY_M))
 }
 
-impl<'a> Parts<'a> {
-    fn of(surface: &'a Grid<f32>, cell_m: f64) -> Self {
-        let is_known = surface.map(|h| !h.is_nan());
-        Self { surface, regions: Regions::smooth(&is_known, surface, STEP_M.max(cell_m as f32)), cell_m }
-    }
+/// Returns the parts of a surface without steps.
+fn parts(surface: &Grid<f32>, cell_m: f64) -> Regions {
+    Regions::smooth(&surface.map(|h| !h.is_nan()), surface, STEP_M.max(cell_m as f32))
+}
 
-    /// Marks the cells of the parts that are `chosen`.
-    fn mask(&self, chosen: impl Fn(usize) -> bool) -> Grid<bool> {
-        let mut mask = self.surface.map(|_| false);
-        for part in (0..self.regions.len()).filter(|part| chosen(*part)) {
-            self.regions.cells(part).iter().for_each(|&cell| mask.data_mut()[cell as usize] = true);
-        }
-        mask
-    }
-
-    fn is_small(&self, part: usize) -> bool {
-        (self.regions.cells(part).len() as f64) * self.cell_m.powi(2) < CLEARING_MIN_M2
-    }
-
-    fn is_between_voids(&self, part: usize) -> bool {
-        let width = self.surface.width();
-        let (mut voids, mut heights) = (0, 0);
-        for &cell in self.regions.cells(part) {
-            for (dx, dy) in [(1, 0), (-1, 0), (0, 1), (0, -1)] {
-                for step in 1..=SURROUNDINGS {
-                    let column = (cell as usize % width).checked_add_signed(step * dx);
-                    let row = (cell as usize / width).checked_add_signed(step * dy);
-                    let (Some(column), Some(row)) = (column, row) else { continue };
-                    match self.surface.get(column, row) {
-                        Some(height) if height.is_nan() => voids += 1,
-                        Some(_) if !self.regions.holds(part, (row * width + column) as u32) => heights += 1,
-                        _ => {}
-                    }
-                }
-            }
-        }
-        voids > heights
-    }
+fn is_small(parts: &Regions, part: usize, cell_m: f64) -> bool {
+    (parts.cells(part).len() as f64) * cell_m.powi(2) < CLEARING_MIN_M2
 }
 
 #[cfg(test)]

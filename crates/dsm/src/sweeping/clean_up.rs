@@ -114,7 +114,7 @@ pub(crate) fn clean_up(
     let (mut above_m, completed) = (above(&fused.height_m), above(&completed));
     let ground = match voids.fill {
         Fill::None => trusted.map(|_| f32::NAN),
-        _ => above(&ground(&fused.height_m, &trusted, gsd_m)),
+        _ => above(&ground_under(&fused.height_m, &trusted, gsd_m)),
     };
     let known = KnownVoids { trusted: &trusted, blind: voids.blind, completed_m: &completed, ground_m: &ground };
     let filled = fill_voids(&mut above_m, known, bounds, &fill_config(voids.fill, gsd_m));
@@ -129,13 +129,16 @@ pub(crate) fn clean_up(
 }
 
 /// Returns the ground under the trusted heights, metres; NaN far from any.
-fn ground(height_m: &Grid<f32>, trusted: &Grid<bool>, gsd_m: f64) -> Grid<f32> {
+///
+/// It tells how low a void may be. Voids are filled relative to the trend all the same: that is
+/// even, and the ground repeats the noise of the heights that it goes through.
+fn ground_under(height_m: &Grid<f32>, trusted: &Grid<bool>, gsd_m: f64) -> Grid<f32> {
     let mut seen = height_m.clone();
     let doubted = seen.data_mut().iter_mut().zip(trusted.data()).filter(|(_, is_trusted)| !**is_trusted);
     doubted.for_each(|(height, _)| *height = f32::NAN);
     let unobserved = seen.map(|h| h.is_nan());
     let found = bare_ground_of_observed(&seen, Some(&unobserved), gsd_m, &GroundConfig::default(), &Silent);
-    found.expect("the default settings are valid, and nothing cancels").heights
+    found.expect("the cells and the default settings are valid, and nothing cancels").heights
 }
 
 /// Returns the values that `of` makes of two grids of one size, cell by cell.
