@@ -40,6 +40,7 @@ mod pits;
 mod plate;
 mod regions;
 mod rejoin;
+mod runs;
 mod stray;
 mod trend;
 

@@ -3,6 +3,8 @@
 
 use raster::Grid;
 
+use crate::runs::{Run, runs};
+
 /// Sweeps over the unknown cells of each level. The coarser level has done the rest.
 const SWEEPS: usize = 24;
 /// Over-relaxation of a sweep, which carries heights faster into wide gaps.
@@ -13,38 +15,44 @@ pub(crate) fn filled(known: &Grid<f32>) -> Grid<f32> {
     if !known.data().iter().any(|h| h.is_nan()) || known.data().iter().all(|h| h.is_nan()) {
         return known.clone();
     }
-    let (width, height) = (known.width(), known.height());
     let coarse = filled(&halved(known));
+    let is_unknown = known.map(|h| h.is_nan());
     let mut out = known.clone();
-    let mut unknown = Vec::new();
-    for row in 0..height {
-        for column in 0..width {
-            if out[(column, row)].is_nan() {
-                out[(column, row)] = doubled_at(&coarse, column, row);
-                unknown.push((row * width + column) as u32);
-            }
-        }
+    let unknown = runs(&is_unknown);
+    for Run { row, columns } in &unknown {
+        columns.clone().for_each(|column| out[(column, *row)] = doubled_at(&coarse, column, *row));
     }
+    let mut ahead = Vec::with_capacity(known.width());
     for _ in 0..SWEEPS {
-        sweep(&mut out, &unknown);
+        unknown.iter().for_each(|run| relax(&mut out, run, &mut ahead));
     }
     out
 }
 
-/// Moves every unknown cell towards the mean of its neighbours.
-fn sweep(out: &mut Grid<f32>, unknown: &[u32]) {
-    let (width, height) = (out.width(), out.height());
-    let cells = out.data_mut();
-    for &cell in unknown {
-        let at = cell as usize;
-        let (column, row) = (at % width, at / width);
-        // A neighbour beyond the border has the height of the cell itself.
-        let own = cells[at];
-        let left = if column > 0 { cells[at - 1] } else { own };
-        let right = if column + 1 < width { cells[at + 1] } else { own };
-        let above = if row > 0 { cells[at - width] } else { own };
-        let below = if row + 1 < height { cells[at + width] } else { own };
-        cells[at] = own + RELAXATION * (0.25 * (left + right + above + below) - own);
+/// Moves the unknown cells of a run, from left to right, towards the mean of their neighbours. A
+/// neighbour beyond the border has the height of the cell itself.
+///
+/// `ahead` is memory for what does not depend on the cell to the left, which vector instructions
+/// sum up for the whole run.
+fn relax(out: &mut Grid<f32>, Run { row, columns }: &Run, ahead: &mut Vec<f32>) {
+    const PART: f32 = 0.25 * RELAXATION;
+    let (first, last) = (columns.start, out.width() - 1);
+    let own = out.row(*row);
+    let (above, below) = (out.row(row.saturating_sub(1)), out.row((row + 1).min(out.height() - 1)));
+    ahead.clear();
+    let inner = first..columns.end.min(last);
+    let right = &own[inner.start + 1..=inner.end];
+    let around = above[inner.clone()].iter().zip(&below[inner.clone()]).zip(right).zip(&own[inner]);
+    let sum =
+        |(((above, below), right), own): (((&f32, &f32), &f32), &f32)| (right - own) + (above - own) + (below - own);
+    ahead.extend(around.map(|cells| PART * sum(cells)));
+    if columns.end > last {
+        ahead.push(PART * ((above[last] - own[last]) + (below[last] - own[last])));
+    }
+    let mut left = own[first.saturating_sub(1)];
+    for (cell, ahead) in out.row_mut(*row)[columns.clone()].iter_mut().zip(ahead) {
+        *cell += *ahead + PART * (left - *cell);
+        left = *cell;
     }
 }
 
