@@ -82,7 +82,11 @@ struct Scale {
 
 impl Scale {
     fn of(input: &ClassifyInput<'_>, config: &ClassifyConfig) -> Self {
-        let bare = input.above_ground.map(|above| above.abs() < BARE_M);
+        let mut bare = input.above_ground.map(|above| above.abs() < BARE_M);
+        // Filled ground is smooth, and tells nothing about the noise.
+        if let Some(weak) = input.weak {
+            clear(&mut bare, weak);
+        }
         let reach = reach_of(config.window_m, input.cell_m);
         let noise_m = median_residual(input.surface, &bare, reach, WINDOWS_MIN);
         let of_noise = noise_m.map_or(config.roughness_m, |noise| config.ground_residuals * noise);
