@@ -55,7 +55,7 @@ pub fn feather_weight(gives: &Grid<bool>, sees: &Grid<bool>, radius: usize) -> G
     let mut weight = gives.map(|&gives| if gives { 1.0 } else { 0.0 });
     for _ in 0..2 {
         weight = box_filter_rows(&weight, half);
-        weight = transposed(&box_filter_rows(&transposed(&weight), half));
+        weight = box_filter_rows(&weight.transposed(), half).transposed();
     }
     for (weight, sees) in weight.data_mut().iter_mut().zip(sees.data()) {
         if !sees {
@@ -79,14 +79,6 @@ fn box_filter_rows(values: &Grid<f32>, half: usize) -> Grid<f32> {
             let (from, to) = (x.saturating_sub(half), (x + half + 1).min(width));
             *out = (sums[to] - sums[from]) as f32 * share;
         }
-    }
-    out
-}
-
-fn transposed(values: &Grid<f32>) -> Grid<f32> {
-    let mut out = Grid::filled(values.height(), values.width(), 0.0);
-    for y in 0..values.height() {
-        values.row(y).iter().enumerate().for_each(|(x, value)| out[(y, x)] = *value);
     }
     out
 }

@@ -1,5 +1,7 @@
 //! A dense row-major grid.
 
+use rayon::prelude::*;
+
 use crate::Window;
 
 /// Raster of `width × height` cells in row-major order. `(column, row)` = (0, 0) is the upper-left
@@ -37,6 +39,19 @@ impl<T: Copy> Grid<T> {
             }
         }
         part
+    }
+
+    /// Returns the grid with columns and rows exchanged, so that a pass along rows also serves for
+    /// columns.
+    pub fn transposed(&self) -> Self
+    where
+        T: Send + Sync,
+    {
+        let mut data = self.data.clone();
+        data.par_chunks_mut(self.height.max(1)).enumerate().for_each(|(column, cells)| {
+            cells.iter_mut().enumerate().for_each(|(row, cell)| *cell = self.data[row * self.width + column]);
+        });
+        Self { width: self.height, height: self.width, data }
     }
 }
 
@@ -121,5 +136,13 @@ mod tests {
         assert_eq!(grid.window(Window::whole(3, 2), 0), grid);
         assert_eq!(grid.window(Window { x: 9, y: 9, width: 2, height: 1 }, 7).data(), [7, 7]);
         assert_eq!(grid.window(Window { x: i64::MAX, y: i64::MIN, width: 1, height: 1 }, 7).data(), [7]);
+    }
+
+    #[test]
+    fn columns_become_rows() {
+        let grid = Grid::from_vec(3, 2, vec![1, 2, 3, 4, 5, 6]).unwrap();
+        assert_eq!(grid.transposed(), Grid::from_vec(2, 3, vec![1, 4, 2, 5, 3, 6]).unwrap());
+        assert_eq!(grid.transposed().transposed(), grid);
+        assert_eq!(Grid::filled(0, 4, 1).transposed(), Grid::filled(4, 0, 1));
     }
 }

@@ -1,4 +1,5 @@
-//! Rasters in memory: grids, geotransforms, windows, masks, polygons, pyramids and resampling.
+//! Rasters in memory: grids, geotransforms, windows, masks, polygons, pyramids, openings and
+//! resampling.
 //!
 //! All functions use one pixel convention: the centre of the upper-left pixel is at (0, 0). GDAL's
 //! corner convention (centre at 0.5, 0.5) appears in [`GeoTransform`] and in the readers only.
@@ -9,6 +10,7 @@ mod gaussian;
 mod geotransform;
 mod grid;
 mod mask;
+mod opening;
 mod outline;
 mod polygon;
 mod pyramid;
@@ -22,6 +24,7 @@ pub use gaussian::gaussian;
 pub use geotransform::GeoTransform;
 pub use grid::Grid;
 pub use mask::{FLAG_NO_DATA, FLAG_OUTSIDE, FLAG_SATURATED, Flags, is_missing};
+pub use opening::{highest, lowest, opened};
 pub use outline::outlines;
 pub use polygon::mark_inside;
 pub use pyramid::{Pyramid, level_from_level0, level0_from_level, reduce};

@@ -12,10 +12,9 @@
 //!
 //! The constants were chosen on simulated hills (seeds 2 to 4, 300 m).
 
-use raster::Grid;
+use raster::{Grid, highest, lowest};
 
 use crate::coarse::{blurred, difference, distances_m, widened, without_cells};
-use crate::opening::{highest, lowest};
 use crate::plate::plate;
 use crate::regions::{Regions, quantile};
 

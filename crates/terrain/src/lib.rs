@@ -35,7 +35,6 @@ mod heights;
 mod membrane;
 mod narrow;
 mod objects;
-mod opening;
 mod pits;
 mod plate;
 mod regions;

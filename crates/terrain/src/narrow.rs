@@ -6,11 +6,10 @@
 //! Steep ground loses more in each step. So the slope that a window may cut off grows by half of
 //! the slope of the ground as far as it is known.
 
-use raster::Grid;
+use raster::{Grid, opened};
 
 use crate::config::{GroundConfig, NOISE_DEVIATIONS};
 use crate::heights::Heights;
-use crate::opening::opened;
 
 /// Half-width of the widest window, metres: the value of Pingel et al., for houses and trees. What
 /// is wider is judged by its border, because hills are as wide.

@@ -2,14 +2,13 @@
 //! of the wider candidates those that the surface drops away from on most of their border.
 
 use numeric::{Cancelled, Progress};
-use raster::Grid;
+use raster::{Grid, opened};
 
 use crate::coarse::difference;
 use crate::config::GroundConfig;
 use crate::heights::Heights;
 use crate::membrane::filled;
 use crate::narrow::{NARROW_M, narrow_objects};
-use crate::opening::opened;
 use crate::regions::{Regions, quantile};
 
 /// Growth of the half-width from one window to the next.

@@ -4,10 +4,9 @@
 //! lies below it: many cells around agree with the level of a gap, and hardly any with that
 //! of a pit. And the rim of a pit, the ground, is even, whereas crowns and roofs differ in height.
 
-use raster::Grid;
+use raster::{Grid, highest, lowest};
 
 use crate::coarse::{difference, without_cells};
-use crate::opening::{highest, lowest};
 use crate::regions::{Regions, quantile};
 
 /// Half-widths of the windows that find what lies deep, metres: single cells, then patches.

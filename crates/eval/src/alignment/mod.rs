@@ -8,4 +8,3 @@ pub(super) mod registration;
 pub(super) mod resample;
 pub(super) mod search;
 pub(super) mod smooth;
-pub(super) mod transpose;

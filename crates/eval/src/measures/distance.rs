@@ -2,16 +2,15 @@
 //! Huttenlocher 2012, Theory of Computing 8, 415-428). It is exact, takes linear time and allows
 //! any side lengths.
 
-use crate::alignment::transpose::transposed;
 use raster::Grid;
 use rayon::prelude::*;
 
 /// Returns the distances between cell centres. They are infinite if no cell is marked.
 pub(crate) fn distances_m(marked: &Grid<bool>, cell_size_m: (f64, f64)) -> Grid<f32> {
     let (width, height) = (marked.width(), marked.height());
-    let columns = transposed(&marked.map(|&m| if m { 0.0 } else { f64::INFINITY }));
+    let columns = marked.map(|&m| if m { 0.0 } else { f64::INFINITY }).transposed();
     let along_columns = squared(columns, cell_size_m.1);
-    let both = squared(transposed(&along_columns), cell_size_m.0);
+    let both = squared(along_columns.transposed(), cell_size_m.0);
     debug_assert_eq!((both.width(), both.height()), (width, height));
     both.map(|d| d.sqrt() as f32)
 }

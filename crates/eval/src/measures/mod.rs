@@ -8,7 +8,6 @@ pub(super) mod edges;
 pub(super) mod gradient;
 pub(super) mod metrics;
 pub(super) mod objects;
-pub(super) mod opening;
 pub(super) mod origin;
 pub(super) mod sharpness;
 pub(super) mod standing;

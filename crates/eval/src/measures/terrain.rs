@@ -14,9 +14,8 @@
 use crate::alignment::align::MetresFromCells;
 use crate::alignment::resample::bilinear;
 use crate::measures::gradient::{gradients, steepness};
-use crate::measures::opening::opened;
 use numeric::percentile;
-use raster::Grid;
+use raster::{Grid, opened};
 use serde::Serialize;
 
 /// Width of the largest window, metres. Wider structures count as ground.
