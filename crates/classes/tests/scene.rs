@@ -252,7 +252,7 @@ fn filled_ground_tells_nothing_about_the_noise_of_roofs() {
     let mut weak = heights.map(|_| false);
     for at in 0..SIDE * SIDE {
         let is_filled = truth.data()[at] == GROUND && at % SIDE > SIDE / 3;
-        let noise_m = if (at % SIDE + at / SIDE) % 2 == 0 { 0.08 } else { -0.08 };
+        let noise_m = if (at % SIDE + at / SIDE).is_multiple_of(2) { 0.08 } else { -0.08 };
         heights.data_mut()[at] = if is_filled { 0.0 } else { heights.data()[at] + noise_m };
         weak.data_mut()[at] = is_filled;
     }
