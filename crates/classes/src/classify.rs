@@ -83,7 +83,7 @@ struct Scale {
 impl Scale {
     fn of(input: &ClassifyInput<'_>, config: &ClassifyConfig) -> Self {
         let mut bare = input.above_ground.map(|above| above.abs() < BARE_M);
-        // Filled ground is smooth, and tells nothing about the noise.
+        // Filled ground is smooth, and doubtful heights are no ground: neither tells the noise.
         if let Some(weak) = input.weak {
             clear(&mut bare, weak);
         }

@@ -3,13 +3,14 @@
 //! The plane of a window is the least-squares plane; on a full square window its coefficients are
 //! sums over the window. Windows with voids or with cells that do not count have none.
 
-use raster::Grid;
+use raster::{Grid, lowest};
 
 /// Returns, for each cell, the least root-mean-square residual of the planes of all windows of
 /// (2 `reach` + 1)² cells that hold the cell, metres. Only windows whose cells all `count` are
 /// looked at; cells in none of them are infinitely rough.
 pub(crate) fn least_residual(surface: &Grid<f32>, counts: &Grid<bool>, reach: usize) -> Grid<f32> {
-    spread_least(&residuals(surface, counts, reach), reach)
+    let least = lowest(&residuals(surface, counts, reach), reach);
+    least.map(|residual| if residual.is_nan() { f32::INFINITY } else { *residual })
 }
 
 /// Returns the root-mean-square residual of the plane of the window around each cell, metres;
@@ -66,28 +67,6 @@ fn residual(surface: &Grid<f32>, counts: &Grid<bool>, reach: usize, (column, row
     let count = ((2 * reach + 1) * (2 * reach + 1)) as f64;
     let explained = sum * sum / count + (along * along + across * across) / of_steps.max(1.0);
     ((squares - explained).max(0.0) / count).sqrt() as f32
-}
-
-/// Returns the least value within `reach` cells along both axes.
-fn spread_least(values: &Grid<f32>, reach: usize) -> Grid<f32> {
-    let (width, height) = (values.width(), values.height());
-    let mut along = Grid::filled(width, height, f32::INFINITY);
-    for row in 0..height {
-        let source = values.row(row);
-        for (column, least) in along.row_mut(row).iter_mut().enumerate() {
-            let window = &source[column.saturating_sub(reach)..(column + reach + 1).min(width)];
-            *least = window.iter().copied().fold(f32::INFINITY, f32::min);
-        }
-    }
-    let mut found = Grid::filled(width, height, f32::INFINITY);
-    for row in 0..height {
-        for near in row.saturating_sub(reach)..(row + reach + 1).min(height) {
-            for (least, value) in found.row_mut(row).iter_mut().zip(along.row(near)) {
-                *least = least.min(*value);
-            }
-        }
-    }
-    found
 }
 
 #[cfg(test)]

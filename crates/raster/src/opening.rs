@@ -82,7 +82,22 @@ fn fold_ahead(line: &[f32], ahead: usize, out: &mut [f32]) {
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
+
+    proptest! {
+        #[test]
+        fn the_lowest_height_is_that_of_every_window(
+            row in prop::collection::vec(-9.0f32..9.0, 1..40), radius in 0usize..12,
+        ) {
+            let found = lowest(&Grid::from_vec(row.len(), 1, row.clone()).unwrap(), radius);
+            for (i, &value) in found.data().iter().enumerate() {
+                let window = &row[i.saturating_sub(radius)..(i + radius + 1).min(row.len())];
+                prop_assert_eq!(value, window.iter().copied().fold(f32::INFINITY, f32::min));
+            }
+        }
+    }
 
     /// The definition, cell by cell.
     fn plain(surface: &Grid<f32>, radius: usize, pick: fn(f32, f32) -> f32) -> Grid<f32> {
@@ -111,6 +126,14 @@ mod tests {
             for (a, b) in found.data().iter().zip(expected.data()) {
                 assert!(a == b || (a.is_nan() && b.is_nan()), "radius {radius}: {a} {b}");
             }
+        }
+    }
+
+    #[test]
+    fn the_highest_heights_equal_a_plain_search() {
+        let grid = Grid::from_vec(23, 17, (0..23 * 17).map(|i| (i * 7919 % 101) as f32).collect()).unwrap();
+        for radius in [0, 1, 3, 30] {
+            assert_eq!(highest(&grid, radius), plain(&grid, radius, f32::max));
         }
     }
 

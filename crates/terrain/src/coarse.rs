@@ -100,6 +100,11 @@ pub(crate) fn without_cells(heights: &Grid<f32>, mask: &Grid<bool>) -> Grid<f32>
     Grid::from_vec(heights.width(), heights.height(), cells.collect()).expect("one flag per cell")
 }
 
+/// Adds the cells of one mask to another.
+pub(crate) fn add(mask: &mut Grid<bool>, other: &Grid<bool>) {
+    mask.data_mut().iter_mut().zip(other.data()).for_each(|(cell, other)| *cell |= other);
+}
+
 /// Widens a mask by squares of `2·radius + 1` cells.
 pub(crate) fn widened(mask: &Grid<bool>, radius: usize) -> Grid<bool> {
     let shares = blurred(&mask.map(|&set| if set { 1.0 } else { 0.0 }), radius);

@@ -6,7 +6,7 @@ use numeric::Progress;
 use raster::Grid;
 
 use crate::canopy::under_forests;
-use crate::coarse::{at_cell, blocks, blurred, slopes, widened, without_cells};
+use crate::coarse::{add, at_cell, blocks, blurred, slopes, widened, without_cells};
 use crate::config::{GroundConfig, NOISE_DEVIATIONS};
 use crate::error::TerrainError;
 use crate::forest::{forests, roughness};
@@ -16,7 +16,7 @@ use crate::objects::{objects, radii};
 use crate::pits::pits;
 use crate::plate::plate;
 use crate::regions::quantile;
-use crate::rejoin::{PER_SLOPE_M, STEEPEST, rejoined};
+use crate::rejoin::{growth_by_m, rejoined};
 use crate::stray::{islands, stray};
 use crate::trend::{TrendConfig, trend};
 
@@ -151,7 +151,7 @@ pub fn bare_ground_of_observed(
         let slope = slopes(&blurred(&blurred(&known, radius), radius), work_m);
         // What one of the trends hides, the other shows; ground joins again below.
         let again = objects(&heights, (&trend(&known, work_m, &SECOND_TREND), &slope), config, progress)?;
-        found.data_mut().iter_mut().zip(again.data()).for_each(|(found, again)| *found |= again);
+        add(&mut found, &again);
     }
     let is_stray = stray(&without_cells(&clear_m, &found), work_m, noise_m);
     let ground = without_ramps(&without_cells(&clear_m, &is_stray), &found, work_m, noise_m);
@@ -186,7 +186,7 @@ fn without_ramps(surface: &Grid<f32>, objects: &Grid<bool>, cell_m: f64, noise_m
     let slope = slopes(&expected, cell_m);
     let rise_m = RISE_M.max((NOISE_DEVIATIONS * noise_m) as f32);
     for (at, cell) in ground.data_mut().iter_mut().enumerate().filter(|(at, _)| is_near.data()[*at]) {
-        if *cell - expected.data()[at] > rise_m + PER_SLOPE_M * slope.data()[at].min(STEEPEST) {
+        if *cell - expected.data()[at] > rise_m + growth_by_m(slope.data()[at]) {
             *cell = f32::NAN;
         }
     }

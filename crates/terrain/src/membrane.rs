@@ -16,12 +16,8 @@ pub(crate) fn filled(known: &Grid<f32>) -> Grid<f32> {
         return known.clone();
     }
     let coarse = filled(&halved(known));
-    let is_unknown = known.map(|h| h.is_nan());
-    let mut out = known.clone();
-    let unknown = runs(&is_unknown);
-    for Run { row, columns } in &unknown {
-        columns.clone().for_each(|column| out[(column, *row)] = doubled_at(&coarse, column, *row));
-    }
+    let unknown = runs(&known.map(|h| h.is_nan()));
+    let mut out = completed(known, &coarse);
     let mut ahead = Vec::with_capacity(known.width());
     for _ in 0..SWEEPS {
         unknown.iter().for_each(|run| relax(&mut out, run, &mut ahead));
@@ -40,12 +36,13 @@ fn relax(out: &mut Grid<f32>, Run { row, columns }: &Run, ahead: &mut Vec<f32>) 
     let own = out.row(*row);
     let (above, below) = (out.row(row.saturating_sub(1)), out.row((row + 1).min(out.height() - 1)));
     ahead.clear();
-    let inner = first..columns.end.min(last);
-    let right = &own[inner.start + 1..=inner.end];
-    let around = above[inner.clone()].iter().zip(&below[inner.clone()]).zip(right).zip(&own[inner]);
-    let sum =
-        |(((above, below), right), own): (((&f32, &f32), &f32), &f32)| (right - own) + (above - own) + (below - own);
-    ahead.extend(around.map(|cells| PART * sum(cells)));
+    let count = columns.end.min(last) - first;
+    let [right, own_part, above_part, below_part] =
+        [&own[first + 1..], &own[first..], &above[first..], &below[first..]].map(|line| &line[..count]);
+    ahead.extend((0..count).map(|x| {
+        let from = |line: &[f32]| line[x] - own_part[x];
+        PART * (from(right) + from(above_part) + from(below_part))
+    }));
     if columns.end > last {
         ahead.push(PART * ((above[last] - own[last]) + (below[last] - own[last])));
     }
@@ -77,8 +74,19 @@ pub(crate) fn halved(fine: &Grid<f32>) -> Grid<f32> {
     coarse
 }
 
+/// Returns the heights with the NaN cells interpolated from the level that is half as fine.
+pub(crate) fn completed(known: &Grid<f32>, coarse: &Grid<f32>) -> Grid<f32> {
+    let mut out = known.clone();
+    for row in 0..out.height() {
+        for (column, cell) in out.row_mut(row).iter_mut().enumerate().filter(|(_, cell)| cell.is_nan()) {
+            *cell = doubled_at(coarse, column, row);
+        }
+    }
+    out
+}
+
 /// Interpolates a coarse level at a cell of the level that is twice as fine.
-pub(crate) fn doubled_at(coarse: &Grid<f32>, column: usize, row: usize) -> f32 {
+fn doubled_at(coarse: &Grid<f32>, column: usize, row: usize) -> f32 {
     let place = |at: usize, count: usize| {
         let near = at / 2;
         let far = if at % 2 == 1 { (near + 1).min(count - 1) } else { near.saturating_sub(1) };

@@ -6,7 +6,7 @@
 
 use raster::{Grid, highest, lowest};
 
-use crate::coarse::{difference, without_cells};
+use crate::coarse::{add, difference, without_cells};
 use crate::regions::{Regions, quantile};
 
 /// Half-widths of the windows that find what lies deep, metres: single cells, then patches.
@@ -42,7 +42,7 @@ pub(crate) fn pits(surface: &Grid<f32>, trend: &Grid<f32>, cell_m: f64, noise_m:
         let found = regions.mask(|region| {
             regions.cells(region).len() as f64 <= most && !is_confirmed(&level, &regions, region, depth_m, cell_m)
         });
-        is_pit.data_mut().iter_mut().zip(found.data()).for_each(|(is_pit, found)| *is_pit |= found);
+        add(&mut is_pit, &found);
     }
     is_pit
 }

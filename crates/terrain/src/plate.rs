@@ -11,7 +11,7 @@ use std::ops::Range;
 use raster::Grid;
 
 use crate::coarse::widened;
-use crate::membrane::{doubled_at, filled, halved};
+use crate::membrane::{completed, filled, halved};
 use crate::runs::{Run, runs};
 
 /// Sweeps over the cells of each level. The coarser level has done the rest.
@@ -44,8 +44,7 @@ pub(crate) fn plate(known: &Grid<f32>, cell_m: f64, noise_m: f64) -> Grid<f32> {
 
 /// Solves one level. `weight` is that of a known cell of the finest level, 1/m².
 fn solved(known: &Grid<f32>, counts: &Grid<f32>, cell_m: f64, weight: f32) -> Grid<f32> {
-    let (width, height) = (known.width(), known.height());
-    if width.min(height) <= COARSEST {
+    if known.width().min(known.height()) <= COARSEST {
         return filled(known);
     }
     let is_unknown = known.map(|h| h.is_nan());
@@ -53,14 +52,7 @@ fn solved(known: &Grid<f32>, counts: &Grid<f32>, cell_m: f64, weight: f32) -> Gr
         return known.clone();
     }
     let coarse = solved(&halved(known), &halved_sums(counts), 2.0 * cell_m, weight);
-    let mut out = known.clone();
-    for row in 0..height {
-        for column in 0..width {
-            if is_unknown[(column, row)] {
-                out[(column, row)] = doubled_at(&coarse, column, row);
-            }
-        }
-    }
+    let mut out = completed(known, &coarse);
     let active = runs(&widened(&is_unknown, MARGIN));
     let weight = weight * (cell_m * cell_m) as f32;
     let tension = (cell_m / TENSION_M).powi(2) as f32;
@@ -115,8 +107,9 @@ impl Level {
         (start.max(end)..columns.end).for_each(|column| self.relax_at_border(out, (column, *row)));
     }
 
-    /// Moves cells whose bending lies within the raster: of the sum over 12 neighbours, vector
-    /// instructions make all but the two to the left.
+    /// Moves cells whose bending lies within the raster. Its derivative by the height of a cell has
+    /// the weights 20 for the cell, −8 beside it, 2 across corners and 1 two cells away. Vector
+    /// instructions make the sum over all 12 neighbours but the two to the left.
     fn relax_inside(&mut self, out: &mut Grid<f32>, row: usize, columns: Range<usize>) {
         let near_weight = 8.0 + self.tension;
         let count = columns.len();

@@ -11,9 +11,9 @@ use crate::plate::plate;
 /// Distance from the expected ground within which a cell is ground, metres, where it is flat.
 const LEVEL_M: f64 = 0.5;
 /// Growth of that distance with the slope, metres; both are the values of Pingel et al.
-pub(crate) const PER_SLOPE_M: f32 = 1.25;
+const PER_SLOPE_M: f32 = 1.25;
 /// Steepest slope that counts: the ramp of a wall in a surface from images is steeper.
-pub(crate) const STEEPEST: f32 = 1.0;
+const STEEPEST: f32 = 1.0;
 /// Half-width over which the slope is measured, metres: more than the ramp of a wall.
 const SLOPE_HALF_WIDTH_M: f64 = 2.0;
 /// Rounds. Each carries the ground a few cells further up a bank; more of them climb onto roofs.
@@ -49,5 +49,10 @@ pub(crate) fn level_m(noise_m: f64) -> f32 {
 /// Returns the growth of that distance by the slope of the expected ground, metres.
 pub(crate) fn growth_m(expected: &Grid<f32>, cell_m: f64) -> Grid<f32> {
     let radius = (SLOPE_HALF_WIDTH_M / cell_m).round() as usize;
-    slopes(&blurred(expected, radius), cell_m).map(|slope| PER_SLOPE_M * slope.min(STEEPEST))
+    slopes(&blurred(expected, radius), cell_m).map(|slope| growth_by_m(*slope))
+}
+
+/// Returns the growth of that distance by a slope, metres.
+pub(crate) fn growth_by_m(slope: f32) -> f32 {
+    PER_SLOPE_M * slope.min(STEEPEST)
 }

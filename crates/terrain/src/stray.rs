@@ -6,7 +6,7 @@
 
 use raster::Grid;
 
-use crate::coarse::{difference, distances_m, without_cells};
+use crate::coarse::{add, difference, distances_m, without_cells};
 use crate::objects::{CLEARING_MIN_M2, STEP_M, STOREY_M};
 use crate::pits::depth_m;
 use crate::plate::plate;
@@ -35,7 +35,7 @@ pub(crate) fn islands(surface: &Grid<f32>, cell_m: f64) -> Grid<bool> {
 pub(crate) fn stray(ground: &Grid<f32>, cell_m: f64, noise_m: f64) -> Grid<bool> {
     let mut is_stray = small_strays(ground, cell_m, noise_m);
     let raised = raised(&without_cells(ground, &is_stray), cell_m, noise_m);
-    is_stray.data_mut().iter_mut().zip(raised.data()).for_each(|(is_stray, raised)| *is_stray |= raised);
+    add(&mut is_stray, &raised);
     is_stray
 }
 
