@@ -2,7 +2,7 @@
 //! correction that predicts points it was not made from.
 
 use camera::{ImageCorrection, RpcCamera};
-use sweep::pointing::{AdjustConfig, ControlPoint, ModelOrder, Observations, adjust_to_control};
+use sweep::pointing::{AdjustConfig, ChipConfig, ControlPoint, ModelOrder, Observations, adjust_to_control};
 
 /// Residual up to which a point agrees with a correction, pixels.
 pub(super) const AGREES_PX: f64 = 1.5;
@@ -96,12 +96,19 @@ pub(super) fn order_of(camera: &RpcCamera, size: (usize, usize), points: &[Contr
         let gains: Vec<f64> = best.1.iter().zip(&own).map(|(a, b)| a - b).collect();
         let count = gains.len() as f64;
         let mean = gains.iter().sum::<f64>() / count;
-        let square = gains.iter().map(|gain| (gain - mean) * (gain - mean)).sum::<f64>();
-        if mean > LEAD_SIGMAS * (square / (count * (count - 1.0))).sqrt() {
+        let variance = gains.iter().map(|gain| (gain - mean) * (gain - mean)).sum::<f64>() / (count - 1.0);
+        if mean > LEAD_SIGMAS * (variance / independent(count, size)).sqrt() {
             best = (order, own);
         }
     }
     best.0
+}
+
+/// Returns how many of so many points are independent: chips that show the same pixels have the same
+/// errors.
+fn independent(count: f64, (width, height): (usize, usize)) -> f64 {
+    let side = (2 * ChipConfig::default().radius_max + 1) as f64;
+    count.min((width as f64 / side) * (height as f64 / side)).max(1.0)
 }
 
 /// Returns the squared residual of each point under the correction of the points of other parts,

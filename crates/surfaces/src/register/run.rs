@@ -5,12 +5,13 @@ use std::path::PathBuf;
 use camera::{ImageCorrection, RpcCamera};
 use geodesy::LonLatHeight;
 use numeric::{Progress, upper_median};
+use occlusion::OcclusionSurface;
 use sweep::pointing::{ControlPoint, ModelOrder};
 
 use super::config::{RegisterConfig, RegisterOrder};
 use super::error::RegisterError;
 use super::evidence::{AGREES_PX, adjusted_to_most, order_of, residuals, sharing};
-use super::matching;
+use super::matching::{Found, Searched};
 use super::model::{Looks, Model, NewImage};
 use super::page;
 use super::report::{RegisterReport, RegisteredImage};
@@ -62,12 +63,14 @@ fn register(config: &RegisterConfig, progress: &dyn Progress) -> Result<Register
     let mut new = open(config, &model, camera)?;
     let info = new.image.source.info();
     let size = (info.width, info.height);
+    let surface = OcclusionSurface::new(&model.heights, model.cell_m);
+    let mut searched = Searched::new(&model, &surface, new.gsd_m);
     progress.begin("rounds", ROUNDS);
     let mut rounds = 0;
     loop {
         progress.check_cancelled()?;
         let reach_px = if rounds == 0 { config.reach_px } else { CLOSE_PX.min(config.reach_px) };
-        let found = matching::search(&model, &new, reach_px, progress)?;
+        let found = searched.search(&new, reach_px, progress)?;
         if found.points.len() < POINTS_MIN {
             let (found, tried) = (found.points.len(), found.tried);
             return Err(RegisterError::TooFew { found, tried, needed: POINTS_MIN, reach_px });
@@ -142,7 +145,7 @@ fn seen_with((point, [along, across]): (&ControlPoint, [f64; 2])) -> Option<[f64
 fn judged(
     model: &Model,
     new: &NewImage,
-    found: &matching::Found,
+    found: &Found,
     (rounds, order): (usize, RegisterOrder),
 ) -> Result<RegisterReport, RegisterError> {
     let camera = &new.image.camera;

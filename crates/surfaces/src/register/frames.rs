@@ -1,0 +1,192 @@
+//! The frames in which the model and the image are compared: windows of one grid over the model,
+//! whose cells are as wide as a pixel of the image.
+//!
+//! Frames overlap, and those of the model are wanted again in every round. What an image shows of a
+//! cell of the grid is therefore kept.
+
+use geodesy::LonLatHeight;
+use occlusion::{GridGround, OcclusionSurface};
+use ortho::Sight;
+use raster::Grid;
+
+use super::error::RegisterError;
+use super::model::Model;
+use crate::ortho::{Cell, OrthoImage, look};
+
+/// Height by which the surface must stand above a line of sight to hide what is behind it, metres.
+/// Noise of a measured surface hides nothing.
+const TOLERANCE_M: f64 = 1.0;
+/// Side of the blocks in which cells are kept. A frame is a few of them wide.
+const BLOCK: usize = 32;
+
+/// The grid over the model.
+pub(super) struct Frames<'a> {
+    surface: &'a OcclusionSurface<'a>,
+    ground: &'a GridGround,
+    unobserved: Option<&'a Grid<bool>>,
+    beside_jumps: &'a Grid<bool>,
+    /// Cells of the model per cell of a frame.
+    step: f64,
+    /// Columns and rows.
+    size: [usize; 2],
+}
+
+/// A square window of the grid.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Frame {
+    /// Column and row in the middle.
+    pub(super) centre: [usize; 2],
+    /// Cells on every side of it.
+    pub(super) half: usize,
+}
+
+impl Frame {
+    /// Returns the cells of the grid, row by row; `None` outside.
+    fn cells(self, size: [usize; 2]) -> impl Iterator<Item = Option<[usize; 2]>> {
+        let side = 2 * self.half + 1;
+        (0..side * side).map(move |k| {
+            let inside =
+                |axis: usize, i: usize| (self.centre[axis] + i).checked_sub(self.half).filter(|at| *at < size[axis]);
+            Some([inside(0, k % side)?, inside(1, k / side)?])
+        })
+    }
+
+    fn picture(self, values: Vec<f32>) -> Grid<f32> {
+        let side = 2 * self.half + 1;
+        Grid::from_vec(side, side, values).unwrap_or_else(|| Grid::filled(0, 0, f32::NAN))
+    }
+}
+
+impl<'a> Frames<'a> {
+    pub(super) fn new(model: &'a Model, surface: &'a OcclusionSurface<'a>, gsd_m: f64) -> Self {
+        let step = gsd_m / model.cell_m;
+        let along = |cells: usize| ((cells as f64 - 1.0) / step) as usize + 1;
+        Self {
+            surface,
+            ground: &model.ground,
+            unobserved: model.unobserved.as_ref(),
+            beside_jumps: &model.beside_jumps,
+            step,
+            size: [along(model.heights.width()), along(model.heights.height())],
+        }
+    }
+
+    /// Returns cells of the grid on a lattice of `count` along its longer side, which begins so many
+    /// spacings from its corner. All of them have heights.
+    pub(super) fn centres(&self, count: usize, from: [f64; 2]) -> Vec<[usize; 2]> {
+        let spacing = self.size[0].max(self.size[1]) as f64 / count as f64;
+        let along = |axis: usize| {
+            let cells = self.size[axis] as f64;
+            let count = (cells / spacing).floor().max(1.0);
+            (0..count as usize).map(move |i| ((i as f64 + from[axis]) * cells / count) as usize)
+        };
+        let lattice = along(1).flat_map(|row| along(0).map(move |column| [column, row]));
+        lattice.filter(|at| self.height_at(at.map(|at| at as f64)).is_finite()).collect()
+    }
+
+    /// Returns the column and row of the model.
+    fn in_model(&self, at: [f64; 2]) -> [f64; 2] {
+        at.map(|at| at * self.step)
+    }
+
+    /// Returns the height of the surface at a place on the grid, metres; NaN where it has none.
+    pub(super) fn height_at(&self, at: [f64; 2]) -> f32 {
+        let [column, row] = self.in_model(at);
+        self.surface.height_at(column, row)
+    }
+
+    /// Returns longitude and latitude of a place on the grid, degrees.
+    pub(super) fn lonlat(&self, at: [f64; 2]) -> [f64; 2] {
+        let [column, row] = self.in_model(at);
+        self.ground.lonlat(column, row)
+    }
+
+    /// Returns a cell that may be compared.
+    fn cell(&self, at: [usize; 2]) -> Option<Cell> {
+        let [column, row] = self.in_model(at.map(|at| at as f64));
+        let nearest = (column.round() as usize, row.round() as usize);
+        let is_marked = |mask: &Grid<bool>| mask.get(nearest.0, nearest.1).is_some_and(|marked| *marked);
+        if self.unobserved.is_some_and(is_marked) || is_marked(self.beside_jumps) {
+            return None;
+        }
+        let height = self.surface.height_at(column, row);
+        let [lon, lat] = self.ground.lonlat(column, row);
+        let ground = LonLatHeight::new(lon, lat, f64::from(height));
+        height.is_finite().then_some(Cell { in_dsm: [column, row], ground })
+    }
+
+    /// Returns a frame of a function of columns and rows of the model; NaN where cells may not be
+    /// compared.
+    pub(super) fn picture(&self, frame: Frame, value: impl Fn([f64; 2]) -> f32) -> Grid<f32> {
+        let one = |at: Option<[usize; 2]>| at.and_then(|at| self.cell(at)).map_or(f32::NAN, |cell| value(cell.in_dsm));
+        frame.picture(frame.cells(self.size).map(one).collect())
+    }
+
+    /// Returns the mean over the bands of an image at cells; NaN where the image does not see them.
+    fn grey(&self, image: &OrthoImage, cells: &[[usize; 2]]) -> Result<Vec<f32>, RegisterError> {
+        let cells: Vec<Option<Cell>> = cells.iter().map(|at| self.cell(*at)).collect();
+        let seen = look(self.surface, image, &cells, TOLERANCE_M)?;
+        let bands = seen.values.len().max(1) as f32;
+        let value = |(k, sight): (usize, &Sight)| match sight {
+            Sight::Seen { .. } => seen.values.iter().map(|band| band[k]).sum::<f32>() / bands,
+            _ => f32::NAN,
+        };
+        Ok(seen.sights.iter().enumerate().map(value).collect())
+    }
+}
+
+/// What an image shows on the grid, as far as frames of it were wanted.
+pub(super) struct Laid {
+    /// Blocks in a row.
+    across: usize,
+    /// Values by block and, within one, row by row; `None` where nothing was wanted yet.
+    blocks: Vec<Option<Vec<Option<f32>>>>,
+}
+
+impl Laid {
+    pub(super) fn new(frames: &Frames<'_>) -> Self {
+        let [across, down] = frames.size.map(|cells| cells.div_ceil(BLOCK));
+        Self { across, blocks: vec![None; across * down] }
+    }
+
+    /// Lays the image on the cells of a frame that it was not laid on yet.
+    pub(super) fn lay(&mut self, image: &OrthoImage, frames: &Frames<'_>, frame: Frame) -> Result<(), RegisterError> {
+        let cells = frame.cells(frames.size).flatten();
+        let missing: Vec<[usize; 2]> = cells.filter(|at| self.value(*at).is_none()).collect();
+        let values = frames.grey(image, &missing)?;
+        for (at, value) in missing.into_iter().zip(values) {
+            let (block, cell) = self.place(at);
+            self.blocks[block].get_or_insert_with(|| vec![None; BLOCK * BLOCK])[cell] = Some(value);
+        }
+        Ok(())
+    }
+
+    /// Returns what the image shows in a frame that it was laid on; NaN where it does not see the
+    /// cells.
+    pub(super) fn picture(&self, frames: &Frames<'_>, frame: Frame) -> Grid<f32> {
+        let value = |at: Option<[usize; 2]>| at.and_then(|at| self.value(at)).unwrap_or(f32::NAN);
+        frame.picture(frame.cells(frames.size).map(value).collect())
+    }
+
+    fn value(&self, at: [usize; 2]) -> Option<f32> {
+        let (block, cell) = self.place(at);
+        self.blocks[block].as_ref()?[cell]
+    }
+
+    /// Returns the block of a cell and its place in there.
+    fn place(&self, [column, row]: [usize; 2]) -> (usize, usize) {
+        (row / BLOCK * self.across + column / BLOCK, row % BLOCK * BLOCK + column % BLOCK)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_frame_over_the_border_has_no_cells_outside() {
+        let cells: Vec<_> = Frame { centre: [0, 2], half: 1 }.cells([2, 3]).collect();
+        let (a, b) = (|row| Some([0, row]), |row| Some([1, row]));
+        assert_eq!(cells, [None, a(1), b(1), None, a(2), b(2), None, None, None]);
+    }
+}
