@@ -6,6 +6,7 @@
 #![allow(dead_code, reason = "no test file uses all of it")]
 
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 use assert_cmd::Command;
 use io::raster::ImageSource;
@@ -20,6 +21,14 @@ pub(crate) fn skysweep() -> Command {
 /// Returns the path of a file of the sample town.
 pub(crate) fn sample(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("data-samples/town").join(name)
+}
+
+/// Returns the path of a file of a town on a quarter of the sample town's area, made once by each
+/// test program: for what holds on every scene, whatever its size.
+pub(crate) fn small_town(name: &str) -> PathBuf {
+    static SCENE: OnceLock<PathBuf> = OnceLock::new();
+    let folder = concat!("small_town_", env!("CARGO_CRATE_NAME"));
+    SCENE.get_or_init(|| simulated(folder, &[("size_m = 320.0", "size_m = 160.0")])).join(name)
 }
 
 /// Simulates the sample town with changed parameters (from, to). `name` is a folder that belongs to

@@ -21,7 +21,7 @@ use serde_json::Value;
 use town::{Frame, Look};
 
 /// Columns and lines of the block, pixels of a metre.
-const SIZE: [usize; 2] = [640, 384];
+const SIZE: [usize; 2] = [640, 288];
 /// First columns and widths of the two strips.
 const STRIPS: [(usize, usize); 2] = [(0, 400), (240, 400)];
 /// Slants of the three images of each pass.

@@ -3,6 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::common::small_town;
 use assert_cmd::Command;
 use io::raster::{Band, BandData, ImageSource, write_image_with_rpc};
 use predicates::prelude::*;
@@ -21,11 +22,12 @@ fn views() -> [PathBuf; 3] {
     ["view_1.tif", "view_2.tif", "view_3.tif"].map(town)
 }
 
-/// Returns the command `skysweep dsm` on two views of the town with coarse cells, which takes a
-/// second.
+/// Returns the command `skysweep dsm` on two views of the small town with coarse cells, which takes
+/// a second.
 fn small(output: &Path) -> Command {
     let mut command = skysweep();
-    command.arg("dsm").arg(town("view_1.tif")).arg(town("view_3.tif")).arg("-o").arg(output).args(["-q", "--gsd", "1"]);
+    command.arg("dsm").args(["view_1.tif", "view_3.tif"].map(small_town)).arg("-o").arg(output);
+    command.args(["-q", "--gsd", "1"]);
     command
 }
 
@@ -34,7 +36,7 @@ fn small(output: &Path) -> Command {
 #[test]
 fn the_order_of_the_images_does_not_change_a_byte() {
     let folder = tempfile::tempdir().unwrap();
-    let [first, second, third] = views();
+    let [first, second, third] = ["view_1.tif", "view_2.tif", "view_3.tif"].map(small_town);
     let orders = [[&first, &second, &third], [&third, &first, &second], [&second, &third, &first]];
     let mut expected: Option<Vec<Vec<u8>>> = None;
     for (number, order) in orders.iter().enumerate() {
@@ -452,7 +454,8 @@ fn overwriting_removes_the_evaluation_of_the_old_surface() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
     small(&out).assert().code(0);
-    let evaluate = || skysweep().arg("eval").arg(out.join("dsm/dsm.tif")).arg(town("truth/dsm.tif")).arg("-q").assert();
+    let evaluate =
+        || skysweep().arg("eval").arg(out.join("dsm/dsm.tif")).arg(small_town("truth/dsm.tif")).arg("-q").assert();
     evaluate().code(0);
     assert!(out.join("eval/report.html").is_file());
     std::fs::write(out.join("eval/notes.txt"), b"mine").unwrap();
@@ -556,7 +559,7 @@ fn progress_tells_the_end_and_verbose_the_stages() {
     let out = folder.path().join("out");
     let run = |arguments: &[&str]| {
         let mut command = skysweep();
-        command.arg("dsm").arg(town("view_1.tif")).arg(town("view_3.tif")).arg("-o").arg(&out).args(["--gsd", "2"]);
+        command.arg("dsm").args(["view_1.tif", "view_3.tif"].map(small_town)).arg("-o").arg(&out).args(["--gsd", "2"]);
         let output = command.args(["--preset", "fast"]).args(arguments).output().unwrap();
         String::from_utf8(output.stderr).unwrap()
     };

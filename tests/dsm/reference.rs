@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::common::sample;
+use crate::common::{sample, small_town};
 use crs::{Crs, HeightConverter, MapProjection, VerticalDatum};
 use eval::{AlignmentMethod, CellMap, EvalConfig, EvalInput, MetresFromCells, evaluate};
 use io::raster::{Band, BandData, CogRaster, Dem, read_dem, write_cog};
@@ -23,8 +23,8 @@ fn write(path: &Path, truth: &Dem, heights: &Grid<f32>, shift: [f64; 3]) {
     write_cog(path, &CogRaster::new(&bands, GeoTransform(c), crs), false).unwrap();
 }
 
-fn config(output: PathBuf, reference: PathBuf) -> DsmConfig {
-    let images = ["view_1.tif", "view_2.tif", "view_3.tif"].map(sample);
+fn config(town: fn(&str) -> PathBuf, output: PathBuf, reference: PathBuf) -> DsmConfig {
+    let images = ["view_1.tif", "view_2.tif", "view_3.tif"].map(town);
     let mut config = DsmConfig::new(images.into(), output);
     config.reference_dem = Some(reference);
     config.dem_vertical = Some(VerticalDatum::Ellipsoid);
@@ -53,7 +53,7 @@ fn the_surface_follows_the_reference_to_a_decimetre() {
         let name = if shift == [0.0; 3] { "here" } else { "moved" };
         let (reference, output) = (folder.path().join(format!("{name}.tif")), folder.path().join(name));
         write(&reference, &truth, &truth.heights, shift);
-        let report: DsmReport = run(&config(output.clone(), reference.clone()), &Silent).unwrap();
+        let report: DsmReport = run(&config(sample, output.clone(), reference.clone()), &Silent).unwrap();
         let found = report.pointing.reference.clone().unwrap();
         (found, left(&output, &reference))
     });
@@ -66,11 +66,11 @@ fn the_surface_follows_the_reference_to_a_decimetre() {
 #[test]
 fn weak_evidence_is_refused() {
     let folder = tempfile::tempdir().unwrap();
-    let truth = read_dem(sample("truth/dsm.tif")).unwrap();
+    let truth = read_dem(small_town("truth/dsm.tif")).unwrap();
     let refused = |name: &str, heights: &Grid<f32>, shift: [f64; 3], words: &str| {
         let reference = folder.path().join(format!("{name}.tif"));
         write(&reference, &truth, heights, shift);
-        let mut config = config(folder.path().join(name), reference);
+        let mut config = config(small_town, folder.path().join(name), reference);
         config.preset = Preset::Fast;
         let error = run(&config, &Silent).unwrap_err();
         assert!(error.to_string().contains(words), "{name}: {error}");
@@ -109,7 +109,7 @@ fn datums_and_planes_are_followed() {
     let (surface, reference) = (folder.path().join("surface.tif"), folder.path().join("tilted.tif"));
     write(&surface, &truth, &truth.heights, [0.0; 3]);
     write(&reference, &truth, &tilted, [0.0, 0.0, -undulation_m]);
-    let mut above_geoid = config(folder.path().join("out"), reference);
+    let mut above_geoid = config(sample, folder.path().join("out"), reference);
     (above_geoid.dem_vertical, above_geoid.reference_plane) = (Some(VerticalDatum::Egm96), true);
     let report: DsmReport = run(&above_geoid, &Silent).unwrap();
     let contradiction = "taken as above egm96, as given, but the file names ellipsoid";
@@ -138,7 +138,7 @@ fn datums_and_planes_are_followed() {
 fn a_model_of_the_bare_ground_is_named() {
     let folder = tempfile::tempdir().unwrap();
     for (name, is_named) in [("truth/dtm.tif", true), ("truth/dsm.tif", false)] {
-        let mut config = config(folder.path().join(if is_named { "dtm" } else { "dsm" }), sample(name));
+        let mut config = config(sample, folder.path().join(if is_named { "dtm" } else { "dsm" }), sample(name));
         (config.dem_vertical, config.preset) = (None, Preset::Fast);
         let report: DsmReport = run(&config, &Silent).unwrap();
         let named = report.warnings.iter().any(|warning| warning.contains("looks like a model of the bare ground"));

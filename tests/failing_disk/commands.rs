@@ -23,12 +23,12 @@ const fn writing(name: &'static str, command: &'static str) -> Writing {
 }
 
 const DSM: &str = "dsm $town/view_1.tif $town/view_3.tif -o out --preset fast --gsd 2";
-const PLAN: &str = "plan $town/view_1.tif $town/view_3.tif -o out --preset fast --gsd 1 --chunk 64";
+const PLAN: &str = "plan $town/view_1.tif $town/view_3.tif -o out --preset fast --gsd 1 --chunk 128";
 
 /// The commands.
 pub(crate) const COMMANDS: &[Writing] = &[
     writing("dsm", DSM),
-    writing("dsm by chunks", "dsm $town/view_1.tif $town/view_3.tif -o out --preset fast --gsd 1 --chunk 64"),
+    writing("dsm by chunks", "dsm $town/view_1.tif $town/view_3.tif -o out --preset fast --gsd 1 --chunk 128"),
     writing("plan", PLAN),
     Writing { name: "run", before: &[PLAN], command: "run out", overwrite: "" },
     Writing { name: "merge", before: &[PLAN, "run out"], command: "merge out", overwrite: "--overwrite" },
@@ -123,7 +123,7 @@ pub(crate) fn prepare(folder: &Path, of: &Writing) {
                 let town = made().town.display();
                 let text = format!(
                     "output = 'out'\n[[scene]]\nname = 'a'\nimages = ['{town}/view_1.tif', '{town}/view_3.tif']\n\
-                     tasks = ['dsm', 'ortho', 'eval']\ndsm.preset = 'fast'\ndsm.gsd_m = 1.0\ndsm.chunk = 64\n\
+                     tasks = ['dsm', 'ortho', 'eval']\ndsm.preset = 'fast'\ndsm.gsd_m = 1.0\ndsm.chunk = 128\n\
                      eval.reference = '{town}/truth/dsm.tif'\n"
                 );
                 std::fs::write(folder.join("batch.toml"), text).unwrap();
@@ -153,7 +153,7 @@ struct Made {
 fn made() -> &'static Made {
     static MADE: OnceLock<Made> = OnceLock::new();
     MADE.get_or_init(|| {
-        let town = simulated("failing_disk", &[("size_m = 320.0", "size_m = 120.0")]);
+        let town = simulated("failing_disk", &[("size_m = 320.0", "size_m = 80.0")]);
         let folder = town.parent().unwrap().join("made");
         let _ = std::fs::remove_dir_all(&folder);
         std::fs::create_dir_all(&folder).unwrap();

@@ -71,8 +71,8 @@ impl<'a> Frames<'a> {
         }
     }
 
-    /// Returns cells of the grid on a lattice of `count` along its longer side, which begins so many
-    /// spacings from its corner. All of them have heights.
+    /// Returns cells of the grid on a lattice of `count` along its longer side, which begins so
+    /// many spacings from its corner. All of them have heights.
     pub(super) fn centres(&self, count: usize, from: [f64; 2]) -> Vec<[usize; 2]> {
         let spacing = self.size[0].max(self.size[1]) as f64 / count as f64;
         let along = |axis: usize| {

@@ -109,8 +109,8 @@ impl<'a> Searched<'a> {
         Ok(found)
     }
 
-    /// Returns the places near those of a lattice around which the model shows most, with the model's
-    /// pictures of so many cells on every side.
+    /// Returns the places near those of a lattice around which the model shows most, with the
+    /// model's pictures of so many cells on every side.
     fn spots(&mut self, from: [f64; 2], half: usize, progress: &dyn Progress) -> Result<Vec<Spot>, RegisterError> {
         let wide = half + SLACK;
         let centres = self.frames.centres(POINTS_ALONG, from);

@@ -6,9 +6,9 @@
 //! are hardly ever right are masked in the comparison. Denser lattices follow until enough points
 //! share a shift. Those are ground points with known places in the new image, from which one
 //! correction in image space follows by iteratively reweighted least squares. A drift or an affine
-//! map is taken where it predicts held-out points better, beyond what chips that overlap share. The image is laid and matched again under
-//! the correction until it settles, because relief moves the pixels of an image that is laid with a
-//! wrong pointing.
+//! map is taken where it predicts held-out points better, beyond what chips that overlap share. The
+//! image is laid and matched again under the correction until it settles, because relief moves the
+//! pixels of an image that is laid with a wrong pointing.
 //!
 //! The report is read wherever corrections are read: `images` holds the new image, and those of
 //! the model with the corrections that they have, also where these change nothing.
