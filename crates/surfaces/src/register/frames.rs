@@ -4,6 +4,8 @@
 //! Frames overlap, and those of the model are wanted again in every round. What an image shows of a
 //! cell of the grid is therefore kept.
 
+use std::collections::HashMap;
+
 use geodesy::LonLatHeight;
 use occlusion::{GridGround, OcclusionSurface};
 use ortho::Sight;
@@ -135,28 +137,25 @@ impl<'a> Frames<'a> {
     }
 }
 
-/// What an image shows on the grid, as far as frames of it were wanted.
+/// What an image shows on the grid, as far as frames of it were wanted: of a large model that is a
+/// small part.
+#[derive(Default)]
 pub(super) struct Laid {
-    /// Blocks in a row.
-    across: usize,
     /// Values by block and, within one, row by row; `None` where nothing was wanted yet.
-    blocks: Vec<Option<Vec<Option<f32>>>>,
+    blocks: HashMap<[usize; 2], Vec<Option<f32>>>,
 }
 
 impl Laid {
-    pub(super) fn new(frames: &Frames<'_>) -> Self {
-        let [across, down] = frames.size.map(|cells| cells.div_ceil(BLOCK));
-        Self { across, blocks: vec![None; across * down] }
-    }
-
     /// Lays the image on the cells of a frame that it was not laid on yet.
     pub(super) fn lay(&mut self, image: &OrthoImage, frames: &Frames<'_>, frame: Frame) -> Result<(), RegisterError> {
-        let cells = frame.cells(frames.size).flatten();
-        let missing: Vec<[usize; 2]> = cells.filter(|at| self.value(*at).is_none()).collect();
+        let missing: Vec<[usize; 2]> = {
+            let mut value = self.reader();
+            frame.cells(frames.size).flatten().filter(|at| value(*at).is_none()).collect()
+        };
         let values = frames.grey(image, &missing)?;
         for (at, value) in missing.into_iter().zip(values) {
-            let (block, cell) = self.place(at);
-            self.blocks[block].get_or_insert_with(|| vec![None; BLOCK * BLOCK])[cell] = Some(value);
+            let (block, cell) = place(at);
+            self.blocks.entry(block).or_insert_with(|| vec![None; BLOCK * BLOCK])[cell] = Some(value);
         }
         Ok(())
     }
@@ -164,19 +163,28 @@ impl Laid {
     /// Returns what the image shows in a frame that it was laid on; NaN where it does not see the
     /// cells.
     pub(super) fn picture(&self, frames: &Frames<'_>, frame: Frame) -> Grid<f32> {
-        let value = |at: Option<[usize; 2]>| at.and_then(|at| self.value(at)).unwrap_or(f32::NAN);
+        let mut value = self.reader();
+        let value = |at: Option<[usize; 2]>| at.and_then(&mut value).unwrap_or(f32::NAN);
         frame.picture(frame.cells(frames.size).map(value).collect())
     }
 
-    fn value(&self, at: [usize; 2]) -> Option<f32> {
-        let (block, cell) = self.place(at);
-        self.blocks[block].as_ref()?[cell]
+    /// Returns a function of the value of a cell, which looks for a block only where another one
+    /// was asked before.
+    fn reader(&self) -> impl FnMut([usize; 2]) -> Option<f32> {
+        let mut last: ([usize; 2], Option<&Vec<Option<f32>>>) = ([usize::MAX; 2], None);
+        move |at| {
+            let (block, cell) = place(at);
+            if last.0 != block {
+                last = (block, self.blocks.get(&block));
+            }
+            last.1?[cell]
+        }
     }
+}
 
-    /// Returns the block of a cell and its place in there.
-    fn place(&self, [column, row]: [usize; 2]) -> (usize, usize) {
-        (row / BLOCK * self.across + column / BLOCK, row % BLOCK * BLOCK + column % BLOCK)
-    }
+/// Returns the block of a cell and its place in there.
+fn place([column, row]: [usize; 2]) -> ([usize; 2], usize) {
+    ([column / BLOCK, row / BLOCK], row % BLOCK * BLOCK + column % BLOCK)
 }
 
 #[cfg(test)]

@@ -66,9 +66,8 @@ impl<'a> Searched<'a> {
             Looks::Images(images) => images.len(),
             Looks::Picture(_) => 0,
         };
-        let frames = Frames::new(model, surface, gsd_m);
-        let laid = (0..images).map(|_| Laid::new(&frames)).collect();
-        Self { frames, looks: &model.looks, laid, spots: Default::default() }
+        let laid = (0..images).map(|_| Laid::default()).collect();
+        Self { frames: Frames::new(model, surface, gsd_m), looks: &model.looks, laid, spots: Default::default() }
     }
 
     /// Searches for points of the model in the image, up to `reach_px` pixels from where its camera
@@ -81,7 +80,7 @@ impl<'a> Searched<'a> {
     ) -> Result<Found, RegisterError> {
         let config = ChipConfig::default();
         let half = config.radius_max + AROUND;
-        let mut laid = Laid::new(&self.frames);
+        let mut laid = Laid::default();
         let mut found = Found { points: Vec::new(), tried: 0 };
         for (lattice, from) in LATTICES.into_iter().enumerate() {
             let spots = match self.spots[lattice].take() {
