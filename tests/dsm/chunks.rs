@@ -5,14 +5,10 @@
 use std::path::Path;
 use std::sync::LazyLock;
 
-use crate::common::small_town;
-use assert_cmd::Command;
 use raster::Grid;
 use serde_json::Value;
 
-fn skysweep() -> Command {
-    Command::cargo_bin("skysweep").expect("the binary is built with the tests")
-}
+use crate::common::{skysweep, small_town};
 
 /// Runs `skysweep dsm` on the small town with further options; returns its report.
 fn run(out: &Path, options: &[&str]) -> Value {

@@ -3,23 +3,16 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::common::small_town;
 use assert_cmd::Command;
 use io::raster::{Band, BandData, ImageSource, write_image_with_rpc};
 use predicates::prelude::*;
 use raster::Grid;
 use serde_json::Value;
 
-fn skysweep() -> Command {
-    Command::cargo_bin("skysweep").expect("the binary is built with the tests")
-}
-
-fn town(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("data-samples/town").join(name)
-}
+use crate::common::{sample, skysweep, small_town};
 
 fn views() -> [PathBuf; 3] {
-    ["view_1.tif", "view_2.tif", "view_3.tif"].map(town)
+    ["view_1.tif", "view_2.tif", "view_3.tif"].map(sample)
 }
 
 /// Returns the command `skysweep dsm` on two views of the small town with coarse cells, which takes
@@ -101,7 +94,7 @@ fn the_town_is_found_where_it_is() {
     let evaluation = skysweep()
         .arg("eval")
         .arg(out.join("dsm/dsm.tif"))
-        .arg(town("truth/dsm.tif"))
+        .arg(sample("truth/dsm.tif"))
         .args(["--align", "xyz", "--json"])
         .output()
         .unwrap();
@@ -179,7 +172,7 @@ fn refused(mut command: Command, output: &Path, message: &str) {
 /// Checks that no surface is made of the first view and `other`.
 fn refused_beside_a_view(other: &Path, output: &Path, message: &str) {
     let mut command = skysweep();
-    command.arg("dsm").arg(town("view_1.tif")).arg(other).arg("-o").arg(output);
+    command.arg("dsm").arg(sample("view_1.tif")).arg(other).arg("-o").arg(output);
     refused(command, output, message);
 }
 
@@ -188,10 +181,10 @@ fn too_few_images_and_the_same_image_twice_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
     let mut command = skysweep();
-    command.arg("dsm").arg(town("view_1.tif")).arg("-o").arg(&out);
+    command.arg("dsm").arg(sample("view_1.tif")).arg("-o").arg(&out);
     refused(command, &out, "expected at least 2");
     let mut command = skysweep();
-    command.arg("dsm").args([town("view_1.tif"), town("view_1.tif")]).arg("-o").arg(&out);
+    command.arg("dsm").args([sample("view_1.tif"), sample("view_1.tif")]).arg("-o").arg(&out);
     refused(command, &out, "given twice");
 }
 
@@ -199,7 +192,7 @@ fn too_few_images_and_the_same_image_twice_are_refused() {
 fn copies_of_one_image_are_noticed() {
     let folder = tempfile::tempdir().unwrap();
     let (copy, out) = (folder.path().join("copy.tif"), folder.path().join("out"));
-    std::fs::copy(town("view_1.tif"), &copy).unwrap();
+    std::fs::copy(sample("view_1.tif"), &copy).unwrap();
     refused_beside_a_view(&copy, &out, "the same image is given twice");
 }
 
@@ -211,7 +204,7 @@ fn images_without_rpc_and_damaged_ones_are_refused() {
     io::raster::write_png_gray(&plain, &raster::Grid::filled(64, 64, 7), false).unwrap();
     refused_beside_a_view(&plain, &out, "RPC");
     let damaged = folder.path().join("damaged.tif");
-    let bytes = std::fs::read(town("view_2.tif")).unwrap();
+    let bytes = std::fs::read(sample("view_2.tif")).unwrap();
     std::fs::write(&damaged, &bytes[..bytes.len() / 2]).unwrap();
     refused_beside_a_view(&damaged, &out, "damaged.tif");
     refused_beside_a_view(&folder.path().join("missing.tif"), &out, "missing.tif");
@@ -221,7 +214,7 @@ fn images_without_rpc_and_damaged_ones_are_refused() {
 fn images_of_different_places_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let (far, out) = (folder.path().join("far.tif"), folder.path().join("out"));
-    let mut rpc = io::rpc::read_for_image(&town("view_3.tif")).unwrap().rpc;
+    let mut rpc = io::rpc::read_for_image(&sample("view_3.tif")).unwrap().rpc;
     rpc.long_off += 0.5;
     let pixels = raster::Grid::filled(722, 752, 100u16);
     let bands = [io::raster::Band { description: "pan", data: io::raster::BandData::U16(&pixels) }];
@@ -234,7 +227,7 @@ fn images_of_different_places_are_refused() {
 fn images_without_tie_points_are_refused_unless_the_pointing_is_taken_as_it_is() {
     let folder = tempfile::tempdir().unwrap();
     let (other, out) = (folder.path().join("other.tif"), folder.path().join("out"));
-    let rpc = io::rpc::read_for_image(&town("view_3.tif")).unwrap().rpc;
+    let rpc = io::rpc::read_for_image(&sample("view_3.tif")).unwrap().rpc;
     let mut random = numeric::SplitMix64::new(7);
     let values = (0..722 * 752).map(|_| random.uniform_in(200.0, 1800.0) as u16).collect();
     let pixels = raster::Grid::from_vec(722, 752, values).unwrap();
@@ -242,7 +235,7 @@ fn images_without_tie_points_are_refused_unless_the_pointing_is_taken_as_it_is()
     io::raster::write_image_with_rpc(&other, &bands, &rpc, None, false).unwrap();
     for command in ["dsm", "plan"] {
         let mut command_line = skysweep();
-        command_line.arg(command).arg(town("view_1.tif")).arg(&other).arg("-o").arg(&out);
+        command_line.arg(command).arg(sample("view_1.tif")).arg(&other).arg("-o").arg(&out);
         command_line.args(["--preset", "fast", "--chunk", "300", "--height-range", "170", "280"]);
         refused(command_line, &out, "--no-pointing");
     }
@@ -303,7 +296,7 @@ fn inputs_that_have_no_effect_are_told() {
     let good = folder.path().join("good.geojson");
     polygon(&good, [5.3986, 43.529, 5.3995, 43.531]);
     let mut command = skysweep();
-    command.arg("dsm").arg(town("view_1.tif")).arg(town("view_3.tif")).arg("-o").arg(&out).args(["--gsd", "1"]);
+    command.arg("dsm").arg(sample("view_1.tif")).arg(sample("view_3.tif")).arg("-o").arg(&out).args(["--gsd", "1"]);
     [&swapped, &far, &good].into_iter().for_each(|mask| {
         command.arg("--mask").arg(mask);
     });
@@ -324,7 +317,7 @@ fn doubtful_images_are_warned_of() {
         std::fs::create_dir(&place).unwrap();
         let images = ["view_1.tif", "view_2.tif"].map(|view| place.join(view));
         for (number, image) in images.iter().enumerate() {
-            std::fs::copy(town(&image.file_name().unwrap().to_string_lossy()), image).unwrap();
+            std::fs::copy(sample(&image.file_name().unwrap().to_string_lossy()), image).unwrap();
             change(image, number);
         }
         let mut command = skysweep();
@@ -472,9 +465,9 @@ fn folders_and_patterns_stand_for_their_images() {
     let pass = folder.path().join("pass");
     std::fs::create_dir(&pass).unwrap();
     for view in ["view_1.tif", "view_3.tif"] {
-        std::fs::copy(town(view), pass.join(view)).unwrap();
+        std::fs::copy(sample(view), pass.join(view)).unwrap();
     }
-    std::fs::copy(town("truth/dsm.tif"), pass.join("no_image.tif")).unwrap();
+    std::fs::copy(sample("truth/dsm.tif"), pass.join("no_image.tif")).unwrap();
     let plan = |images: &[PathBuf]| {
         let mut command = skysweep();
         command.arg("dsm").args(images).arg("-o").arg(folder.path().join("out")).args(["--dry-run", "--json"]);
@@ -491,7 +484,7 @@ fn folders_and_patterns_stand_for_their_images() {
     assert_eq!(plan(&[pass.join("view_1.tif"), folder.path().join("p?ss/view_3.tif")]), named);
     let surfaces = folder.path().join("surfaces");
     std::fs::create_dir(&surfaces).unwrap();
-    std::fs::copy(town("truth/dsm.tif"), surfaces.join("dsm.tif")).unwrap();
+    std::fs::copy(sample("truth/dsm.tif"), surfaces.join("dsm.tif")).unwrap();
     for (image, words) in [(pass.join("*.jp2"), "no file matches the pattern"), (surfaces, "no image with an RPC")] {
         let mut command = skysweep();
         command.arg("dsm").arg(image).arg("-o").arg(folder.path().join("out")).arg("-q");
@@ -546,9 +539,9 @@ fn bounds_have_a_map_of_their_own_and_a_stretched_map_is_told() {
 fn the_same_image_under_two_names_is_noticed() {
     let folder = tempfile::tempdir().unwrap();
     let other = folder.path().join("other.tif");
-    std::os::unix::fs::symlink(town("view_1.tif"), &other).unwrap();
+    std::os::unix::fs::symlink(sample("view_1.tif"), &other).unwrap();
     let mut command = skysweep();
-    command.arg("dsm").arg(town("view_1.tif")).arg(&other).arg("-o").arg(folder.path().join("out")).arg("-q");
+    command.arg("dsm").arg(sample("view_1.tif")).arg(&other).arg("-o").arg(folder.path().join("out")).arg("-q");
     command.assert().code(2).stderr(predicate::str::contains("the same image is given twice"));
 }
 
@@ -584,7 +577,7 @@ fn given_values_are_printed_exactly() {
     let folder = tempfile::tempdir().unwrap();
     let run = |name: &str, options: &[&str]| {
         let mut command = skysweep();
-        command.arg("dsm").arg(town("view_1.tif")).arg(town("view_3.tif")).arg("-o").arg(folder.path().join(name));
+        command.arg("dsm").arg(sample("view_1.tif")).arg(sample("view_3.tif")).arg("-o").arg(folder.path().join(name));
         let output = command.args(["--preset", "fast", "--progress", "none"]).args(options).output().unwrap();
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         String::from_utf8(output.stderr).unwrap()

@@ -3,9 +3,10 @@
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
-use assert_cmd::Command;
 use predicates::prelude::*;
 use serde_json::{Value, json};
+
+use crate::common::{sample, skysweep};
 
 /// Class of roofs in the class raster.
 const ROOF: &str = "6";
@@ -14,14 +15,6 @@ const ROOF: &str = "6";
 const OPEN_PLACE: [f64; 3] = [693_830.5, 4_822_578.5, 182.3];
 /// Half the side of a square around the wrong building, metres.
 const HALF_M: f64 = 10.0;
-
-fn town(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("data-samples/town").join(name)
-}
-
-fn skysweep() -> Command {
-    Command::cargo_bin("skysweep").expect("the binary is built with the tests")
-}
 
 /// The town's surface model without a prior, made once.
 static WITHOUT: LazyLock<PathBuf> =
@@ -33,7 +26,7 @@ fn surface(folder: &Path, name: &str, prior: Option<&Path>) -> PathBuf {
     let mut command = skysweep();
     command
         .arg("dsm")
-        .args(["view_1.tif", "view_2.tif", "view_3.tif"].map(town))
+        .args(["view_1.tif", "view_2.tif", "view_3.tif"].map(sample))
         .args(["-q", "--overwrite", "-o"])
         .arg(&out);
     if let Some(path) = prior {
@@ -45,8 +38,8 @@ fn surface(folder: &Path, name: &str, prior: Option<&Path>) -> PathBuf {
 
 fn evaluation(dsm: &Path) -> Value {
     let mut command = skysweep();
-    command.arg("eval").arg(dsm).arg(town("truth/dsm.tif")).args(["--align", "xyz", "--json", "--classes"]);
-    let output = command.arg(town("truth/classes.tif")).assert().code(0).get_output().stdout.clone();
+    command.arg("eval").arg(dsm).arg(sample("truth/dsm.tif")).args(["--align", "xyz", "--json", "--classes"]);
+    let output = command.arg(sample("truth/classes.tif")).assert().code(0).get_output().stdout.clone();
     serde_json::from_slice(&output).unwrap()
 }
 
@@ -72,7 +65,8 @@ fn moved(boundaries: &Value, by: usize) -> Value {
 /// Writes the town's model without its largest building and with a copy of another one in an open
 /// place.
 fn wrong_model(path: &Path) {
-    let mut model: Value = serde_json::from_slice(&std::fs::read(town("truth/buildings.city.json")).unwrap()).unwrap();
+    let mut model: Value =
+        serde_json::from_slice(&std::fs::read(sample("truth/buildings.city.json")).unwrap()).unwrap();
     let numbers =
         |value: &Value| -> Vec<f64> { value.as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect() };
     let (scale, start) = (numbers(&model["transform"]["scale"]), numbers(&model["transform"]["translate"]));
@@ -112,7 +106,8 @@ fn wrong_model(path: &Path) {
 /// Writes the town's model with every other building, or every one, too high or too low by 4 to
 /// 7 m: a building keeps its walls' feet.
 fn model_with_wrong_heights(path: &Path, every: usize) -> usize {
-    let mut model: Value = serde_json::from_slice(&std::fs::read(town("truth/buildings.city.json")).unwrap()).unwrap();
+    let mut model: Value =
+        serde_json::from_slice(&std::fs::read(sample("truth/buildings.city.json")).unwrap()).unwrap();
     let scale = model["transform"]["scale"][2].as_f64().unwrap();
     let mut vertices = model["vertices"].as_array().unwrap().clone();
     let mut wrong = 0;
@@ -200,7 +195,7 @@ fn buildings_with_wrong_heights_are_refuted_one_by_one_and_cost_nothing() {
 #[test]
 fn a_model_that_is_ten_metres_off_costs_nothing() {
     let folder = tempfile::tempdir().unwrap();
-    let text = std::fs::read(town("truth/buildings.city.json")).unwrap();
+    let text = std::fs::read(sample("truth/buildings.city.json")).unwrap();
     let mut model: Value = serde_json::from_slice(&text).unwrap();
     let west = &mut model["transform"]["translate"][0];
     *west = json!(west.as_f64().unwrap() - 10.0);
@@ -223,7 +218,7 @@ fn a_prior_that_is_none_is_refused_before_anything_is_written() {
         "transform": { "scale": [0.001, 0.001, 0.001], "translate": [0.0, 0.0, 0.0] } });
     std::fs::write(&path, nothing.to_string()).unwrap();
     let mut command = skysweep();
-    command.arg("dsm").args(["view_1.tif", "view_3.tif"].map(town)).args(["--gsd", "1", "-q", "-o"]).arg(&out);
+    command.arg("dsm").args(["view_1.tif", "view_3.tif"].map(sample)).args(["--gsd", "1", "-q", "-o"]).arg(&out);
     command.arg("--prior").arg(&path);
     command.assert().code(2).stderr(predicate::str::contains("empty.city.json"));
     assert!(!out.exists());
@@ -234,12 +229,13 @@ fn a_prior_that_is_none_is_refused_before_anything_is_written() {
 fn a_model_of_another_place_is_named_with_both_extents() {
     let folder = tempfile::tempdir().unwrap();
     let (path, out) = (folder.path().join("away.city.json"), folder.path().join("out"));
-    let mut model: Value = serde_json::from_slice(&std::fs::read(town("truth/buildings.city.json")).unwrap()).unwrap();
+    let mut model: Value =
+        serde_json::from_slice(&std::fs::read(sample("truth/buildings.city.json")).unwrap()).unwrap();
     let east = model["transform"]["translate"][0].as_f64().unwrap();
     model["transform"]["translate"][0] = json!(east + 3000.0);
     std::fs::write(&path, model.to_string()).unwrap();
     let mut command = skysweep();
-    command.arg("dsm").args(["view_1.tif", "view_3.tif"].map(town)).args(["--gsd", "2", "--preset", "fast", "-o"]);
+    command.arg("dsm").args(["view_1.tif", "view_3.tif"].map(sample)).args(["--gsd", "2", "--preset", "fast", "-o"]);
     let warned = predicate::str::contains("no building of the city model stands in the scene")
         .and(predicate::str::contains("the model covers [69"))
         .and(predicate::str::contains("away.city.json"));

@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 
-use crate::common::{sample, simulated};
+use crate::common::sample;
+use crate::scene;
 
 /// A command that writes. `$town` is a small simulated scene, `$made` a folder with a surface model
 /// of it, splats and a dataset, `$samples` the sample town, `$tests` the folder of the tests.
@@ -99,7 +100,7 @@ pub(crate) fn run(folder: &Path, command: &str, overwrite: &str) -> Ended {
     let made = made();
     let full = |word: &str| {
         let places = [
-            ("$town", made.town.as_path()),
+            ("$town", made.town),
             ("$made", made.folder.as_path()),
             ("$samples", made.samples.as_path()),
             ("$tests", made.tests.as_path()),
@@ -144,7 +145,7 @@ pub(crate) fn copy(from: &Path, to: &Path) {
 
 /// What the commands work on, made once.
 struct Made {
-    town: PathBuf,
+    town: &'static Path,
     folder: PathBuf,
     samples: PathBuf,
     tests: PathBuf,
@@ -153,7 +154,7 @@ struct Made {
 fn made() -> &'static Made {
     static MADE: OnceLock<Made> = OnceLock::new();
     MADE.get_or_init(|| {
-        let town = simulated("failing_disk", &[("size_m = 320.0", "size_m = 80.0")]);
+        let town = scene();
         let folder = town.parent().unwrap().join("made");
         let _ = std::fs::remove_dir_all(&folder);
         std::fs::create_dir_all(&folder).unwrap();

@@ -107,11 +107,14 @@ fn path(name: &str) -> String {
     sample(name).to_str().unwrap().to_owned()
 }
 
-/// A file of a scene of 80 m, made once: a command runs eight times on it.
-fn small(name: &str) -> String {
+/// The folder of a scene of 80 m, made once: a command runs eight times on it.
+fn scene() -> &'static Path {
     static SCENE: OnceLock<PathBuf> = OnceLock::new();
-    let scene = SCENE.get_or_init(|| simulated("failing_disk", &[("size_m = 320.0", "size_m = 80.0")]));
-    scene.join(name).to_str().unwrap().to_owned()
+    SCENE.get_or_init(|| simulated("failing_disk", &[("size_m = 320.0", "size_m = 80.0")]))
+}
+
+fn small(name: &str) -> String {
+    scene().join(name).to_str().unwrap().to_owned()
 }
 
 #[test]

@@ -45,9 +45,10 @@ pub(super) struct Found {
 /// The model, as far as it was looked at.
 pub(super) struct Searched<'a> {
     frames: Frames<'a>,
-    looks: &'a Looks,
-    /// The model's images on the frames.
-    laid: Vec<Laid>,
+    /// The images that the model was made from, with what is laid of each on the frames.
+    images: Vec<(&'a OrthoImage, Laid)>,
+    /// The picture on the model's cells that is compared where there are no such images.
+    picture: Option<&'a Grid<f32>>,
     /// What is searched for, by lattice, as far as it is known.
     spots: [Option<Vec<Spot>>; LATTICES.len()],
 }
@@ -62,12 +63,11 @@ struct Spot {
 
 impl<'a> Searched<'a> {
     pub(super) fn new(model: &'a Model, surface: &'a OcclusionSurface<'a>, gsd_m: f64) -> Self {
-        let images = match &model.looks {
-            Looks::Images(images) => images.len(),
-            Looks::Picture(_) => 0,
+        let (images, picture) = match &model.looks {
+            Looks::Images(images) => (images.iter().map(|(_, image)| (image, Laid::default())).collect(), None),
+            Looks::Picture(picture) => (Vec::new(), Some(picture)),
         };
-        let laid = (0..images).map(|_| Laid::default()).collect();
-        Self { frames: Frames::new(model, surface, gsd_m), looks: &model.looks, laid, spots: Default::default() }
+        Self { frames: Frames::new(model, surface, gsd_m), images, picture, spots: Default::default() }
     }
 
     /// Searches for points of the model in the image, up to `reach_px` pixels from where its camera
@@ -113,21 +113,16 @@ impl<'a> Searched<'a> {
     fn spots(&mut self, from: [f64; 2], half: usize, progress: &dyn Progress) -> Result<Vec<Spot>, RegisterError> {
         let wide = half + SLACK;
         let centres = self.frames.centres(POINTS_ALONG, from);
-        if let Looks::Images(images) = self.looks {
-            for centre in &centres {
-                progress.check_cancelled()?;
-                for ((_, image), laid) in images.iter().zip(&mut self.laid) {
-                    laid.lay(image, &self.frames, Frame { centre: *centre, half: wide })?;
-                }
+        for centre in &centres {
+            progress.check_cancelled()?;
+            for (image, laid) in &mut self.images {
+                laid.lay(image, &self.frames, Frame { centre: *centre, half: wide })?;
             }
         }
-        let (frames, laid) = (&self.frames, &self.laid);
-        let seen = match self.looks {
-            Looks::Picture(seen) => Some(seen),
-            Looks::Images(_) => None,
-        };
-        let pictures = |frame: Frame| match seen {
-            Some(seen) => vec![frames.picture(frame, |[column, row]| bicubic(seen, column, row))],
+        let laid: Vec<&Laid> = self.images.iter().map(|(_, laid)| laid).collect();
+        let (frames, picture) = (&self.frames, self.picture);
+        let pictures = |frame: Frame| match picture {
+            Some(picture) => vec![frames.picture(frame, |[column, row]| bicubic(picture, column, row))],
             None => laid.iter().map(|laid| laid.picture(frames, frame)).collect(),
         };
         let spot = |&[column, row]: &[usize; 2]| {
