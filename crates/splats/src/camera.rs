@@ -18,7 +18,7 @@ use super::SplatSurface;
 /// to 1e-6 px.
 const RPC_STEP_M: f64 = 1.0;
 /// Low-pass of the original 3DGS code, px².
-const LOW_PASS_PX2: f64 = 0.3;
+pub(crate) const LOW_PASS_PX2: f64 = 0.3;
 
 /// A position seen by a camera.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -181,6 +181,8 @@ impl CentralFootprint {
 
 #[cfg(test)]
 mod tests {
+    use super::NEAR_M;
+    use crate::camera::LOW_PASS_PX2;
     use crate::{LensSplatCamera, render};
     use camera::{Lens, LensModel, Pose};
     use gaussian::{Splat, quaternion_of_axes};
@@ -227,7 +229,9 @@ mod tests {
     }
 
     proptest! {
-        /// A flat splat has, on the ray of each pixel, its opacity where the ray meets its plane.
+        /// A flat splat has, on the ray of each pixel, its opacity where the ray is nearest to it in
+        /// standard deviations that the low-pass widens, and the depth at which the ray meets its
+        /// plane.
         #[test]
         fn rays_meet_the_plane_of_a_splat(
             position in (-4.0..4.0f64, 2.0..12.0f64, -1.0..4.0f64), normal in prop::array::uniform3(-1.0..1.0f64),
@@ -247,19 +251,26 @@ mod tests {
             };
             let (lens, pose) = level(1.6);
             let seen = render(&[splat], &LensSplatCamera { lens: &lens, pose: &pose }).unwrap();
+            let from = sub(pose.centre, centre);
+            let low_pass = LOW_PASS_PX2 * (centre[1] / 90.0).powi(2);
+            let variances = [scales[0], scales[1], 1e-4].map(|scale| scale * scale + low_pass);
+            // The product of two vectors by the inverse covariance.
+            let product = |a, b| (0..3).map(|k| dot(a, axes[k]) * dot(b, axes[k]) / variances[k]).sum::<f64>();
             for (column, row) in (0..160).step_by(9).flat_map(|c| (0..121).step_by(8).map(move |r| (c, r))) {
                 let direction = [(column as f64 - 79.5) / 90.0, 1.0, -(row as f64 - 60.0) / 90.0];
                 let slant = dot(direction, normal);
                 if slant.abs() < 0.2 {
                     continue;
                 }
-                let t = dot(sub(centre, pose.centre), normal) / slant;
-                let off = sub([0, 1, 2].map(|i| pose.centre[i] + t * direction[i]), centre);
-                let q: f64 = (0..2).map(|k| (dot(off, axes[k]) / scales[k]).powi(2)).sum();
-                let expected = if t > 0.1 { 0.9 * (-0.5 * q).exp() } else { 0.0 };
-                // The low-pass of a pixel widens the splat a little.
+                let t = -dot(from, normal) / slant;
+                let nearest = -product(from, direction) / product(direction, direction);
+                if (nearest - NEAR_M).abs() < 1e-3 {
+                    continue;
+                }
+                let q = product(from, from) - nearest * nearest * product(direction, direction);
+                let expected = if nearest > NEAR_M { 0.9 * (-0.5 * q).exp() } else { 0.0 };
                 let found = f64::from(seen.coverage[(column, row)]);
-                prop_assert!((found - expected).abs() < 0.06, "{column} {row}: {found} {expected}");
+                prop_assert!((found - expected).abs() < 0.005, "{column} {row}: {found} {expected}");
                 if found > 0.5 {
                     let depth = f64::from(seen.median_depth_m[(column, row)]);
                     prop_assert!((depth - t).abs() < 0.02 * t + 0.02, "{column} {row}: {depth} {t}");
