@@ -115,9 +115,15 @@ pub(crate) fn widened(mask: &Grid<bool>, radius: usize) -> Grid<bool> {
 
 /// Returns the distance of each cell to the nearest known cell, metres, by steps of 1 and √2 cells.
 pub(crate) fn distances_m(known: &Grid<f32>, cell_m: f64) -> Grid<f32> {
+    cones(&known.map(|h| if h.is_nan() { f32::NAN } else { 0.0 }), cell_m as f32)
+}
+
+/// Returns the lowest of the cones that open upwards from the known heights and rise by `rise_m`
+/// from one cell to the next, by steps of 1 and √2 cells; +∞ without any height.
+pub(crate) fn cones(known: &Grid<f32>, rise_m: f32) -> Grid<f32> {
     let (width, height) = (known.width(), known.height());
-    let (straight, slanted) = (cell_m as f32, cell_m as f32 * std::f32::consts::SQRT_2);
-    let mut out = known.map(|h| if h.is_nan() { f32::INFINITY } else { 0.0 });
+    let (straight, slanted) = (rise_m, rise_m * std::f32::consts::SQRT_2);
+    let mut out = known.map(|h| if h.is_nan() { f32::INFINITY } else { *h });
     for row in 0..height {
         for column in 0..width {
             let mut least = out[(column, row)];

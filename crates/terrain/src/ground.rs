@@ -153,7 +153,7 @@ pub fn bare_ground_of_observed(
         let again = objects(&heights, (&trend(&known, work_m, &SECOND_TREND), &slope), config, progress)?;
         add(&mut found, &again);
     }
-    let is_stray = stray(&without_cells(&clear_m, &found), work_m, noise_m);
+    let is_stray = stray(&without_cells(&clear_m, &found), &evidence_m, work_m, noise_m);
     let ground = without_ramps(&without_cells(&clear_m, &is_stray), &found, work_m, noise_m);
     let noise_m = noise_of(&ground, work_m);
     let mut ground = rejoined(&without_cells(&surface_m, &is_forest), ground, work_m, noise_m);

@@ -17,7 +17,7 @@ const GROWTH: f64 = 1.33;
 const DROP_SHARE: f32 = 0.45;
 /// Share of the border of an object along which the surface need not drop: slopes, and houses and
 /// trees that adjoin.
-const FREE_SHARE: f64 = 0.35;
+pub(crate) const FREE_SHARE: f64 = 0.35;
 /// The same for a smooth part of an object: the other parts around it may all be higher.
 const FREE_SHARE_OF_PARTS: f64 = 0.8;
 /// Largest height from one cell to the next within a smooth part, metres: a slope of 45° and noise.

@@ -6,35 +6,34 @@
 
 use raster::Grid;
 
-use crate::coarse::{add, difference, distances_m, without_cells};
-use crate::objects::{CLEARING_MIN_M2, STEP_M, STOREY_M};
+use crate::coarse::{add, blurred, cones, difference, slopes, without_cells};
+use crate::membrane::filled;
+use crate::objects::{CLEARING_MIN_M2, FREE_SHARE, STEP_M, STOREY_M};
 use crate::pits::depth_m;
 use crate::plate::plate;
-use crate::regions::Regions;
+use crate::regions::{Regions, quantile};
 use crate::rejoin::{growth_m, level_m};
 
 /// Width of the surroundings of a part that tell whether it lies between voids, cells.
 const SURROUNDINGS: usize = 3;
-/// Growth with the distance of the height from which a part stands above the largest one, metres
-/// per metre: a slope of 11° that begins beyond the largest part.
-const STOREY_PER_M: f32 = 0.2;
+/// Share of the known ground that is less steep than what may lie between two of its parts, and
+/// what that may be steeper, height per distance.
+const STEEP_SHARE: f64 = 0.9;
+const STEEPER: f32 = 0.2;
+/// Half-width over which that ground is smoothed, twice, before its slope is taken, metres.
+const SLOPE_HALF_WIDTH_M: f64 = 5.0;
 
 /// Returns the cells of islands: small parts of a surface with more voids than heights around them.
 pub(crate) fn islands(surface: &Grid<f32>, cell_m: f64) -> Grid<bool> {
     let parts = parts(surface, cell_m);
-    let is_between_voids = |part: usize| {
-        let is_void = parts.around(part, SURROUNDINGS).map(|cell| surface.data()[cell as usize].is_nan());
-        let (voids, cells) = is_void.fold((0, 0), |(voids, cells), is| (voids + usize::from(is), cells + 1));
-        2 * voids > cells
-    };
-    parts.mask(|part| is_small(&parts, part, cell_m) && is_between_voids(part))
+    parts.mask(|part| is_small(&parts, part, cell_m) && void_share(&parts, part, surface) > 0.5)
 }
 
 /// Returns the cells of the stray parts of a ground with NaN at everything else: small ones off the
-/// ground around them, and others that stand above the largest one.
-pub(crate) fn stray(ground: &Grid<f32>, cell_m: f64, noise_m: f64) -> Grid<bool> {
+/// ground around them, and others that stand above it. `surface` is what the ground was found in.
+pub(crate) fn stray(ground: &Grid<f32>, surface: &Grid<f32>, cell_m: f64, noise_m: f64) -> Grid<bool> {
     let mut is_stray = small_strays(ground, cell_m, noise_m);
-    let raised = raised(&without_cells(ground, &is_stray), cell_m, noise_m);
+    let raised = raised(&without_cells(ground, &is_stray), surface, cell_m);
     add(&mut is_stray, &raised);
     is_stray
 }
@@ -62,19 +61,32 @@ fn small_strays(ground: &Grid<f32>, cell_m: f64, noise_m: f64) -> Grid<bool> {
     parts.mask(|part| is_small(&parts, part, cell_m) && is_off(part))
 }
 
-/// Returns the cells of parts that stand above the ground of the largest one. Where it is less than
-/// half of the ground, as in a dense quarter, nothing tells which parts are ground.
-fn raised(ground: &Grid<f32>, cell_m: f64, noise_m: f64) -> Grid<bool> {
+/// Returns the cells of parts between voids that stand above the ground of others: a slope to them
+/// would be steeper than the ground is elsewhere. Where less of the border lies at voids, the search
+/// for objects has seen how far the surface drops, and a terrace stays.
+fn raised(ground: &Grid<f32>, surface: &Grid<f32>, cell_m: f64) -> Grid<bool> {
     let parts = parts(ground, cell_m);
-    let size = |part: &usize| parts.cells(*part).len();
-    let known = ground.data().iter().filter(|h| !h.is_nan()).count();
-    let largest = (0..parts.len()).max_by_key(size).filter(|part| size(part) < known && 2 * size(part) >= known);
-    let Some(largest) = largest else { return ground.map(|_| false) };
-    let main = without_cells(ground, &parts.mask(|part| part != largest));
-    let offset = difference(ground, &plate(&main, cell_m, noise_m));
-    let distance = distances_m(&main, cell_m);
-    let above_m = |part: usize| parts.median(part, |cell| offset.data()[cell] - STOREY_PER_M * distance.data()[cell]);
-    parts.mask(|part| part != largest && above_m(part).is_some_and(|above_m| above_m > STOREY_M))
+    let large = without_cells(ground, &parts.mask(|part| is_small(&parts, part, cell_m)));
+    let highest = cones(&large, steepest(&large, cell_m) * cell_m as f32);
+    let above = difference(ground, &highest);
+    let is_above =
+        |part: usize| parts.median(part, |cell| above.data()[cell]).is_some_and(|above_m| above_m > STOREY_M);
+    parts.mask(|part| void_share(&parts, part, surface) > FREE_SHARE && is_above(part))
+}
+
+/// Returns the steepest slope that may lie between parts of a ground, height per distance.
+fn steepest(ground: &Grid<f32>, cell_m: f64) -> f32 {
+    let radius = (SLOPE_HALF_WIDTH_M / cell_m).round() as usize;
+    let slopes = slopes(&blurred(&blurred(&filled(ground), radius), radius), cell_m);
+    let known = slopes.data().iter().zip(ground.data()).filter(|(_, h)| !h.is_nan());
+    quantile(&mut known.map(|(slope, _)| *slope).collect::<Vec<f32>>(), STEEP_SHARE).unwrap_or(0.0) + STEEPER
+}
+
+/// Returns the share of voids around a part.
+fn void_share(parts: &Regions, part: usize, surface: &Grid<f32>) -> f64 {
+    let is_void = parts.around(part, SURROUNDINGS).map(|cell| surface.data()[cell as usize].is_nan());
+    let (voids, cells) = is_void.fold((0, 0), |(voids, cells), is| (voids + usize::from(is), cells + 1));
+    voids as f64 / cells.max(1) as f64
 }
 
 /// Returns the parts of a surface without steps.
@@ -97,7 +109,7 @@ mod tests {
         for (column, height) in [(30, 2.0), (40, 10.3), (50, 9.0), (60, 12.0)] {
             ground[(column, 20)] = height;
         }
-        let found = stray(&ground, 1.0, 0.05);
+        let found = stray(&ground, &ground, 1.0, 0.05);
         let columns: Vec<usize> = (0..80).filter(|column| found[(*column, 20)]).collect();
         assert_eq!(columns, [30, 60]);
         assert_eq!(found.data().iter().filter(|is| **is).count(), 2);
@@ -113,16 +125,34 @@ mod tests {
             ground.row_mut(row)[45..55].fill(24.0);
             ground.row_mut(row + 20)[45..55].fill(12.0);
         }
-        let found = stray(&ground, 1.0, 0.05);
+        let found = stray(&ground, &ground, 1.0, 0.05);
         assert!((45..55).all(|column| found[(column, 25)] && !found[(column, 45)]));
         assert_eq!(found.data().iter().filter(|is| **is).count(), 100);
+    }
+
+    /// Strips of ground and of roofs: the ground that the most cells show is less than half of all.
+    #[test]
+    fn roofs_between_voids_are_stray_and_the_next_terrace_of_a_known_bank_is_not() {
+        let level = |column: usize| match column {
+            0..20 => 10.0,
+            30..40 => 30.0,
+            50..70 => 11.0,
+            80..95 => 40.0,
+            _ => f32::NAN,
+        };
+        let ground = Grid::from_vec(100, 40, (0..4000).map(|at| level(at % 100)).collect()).unwrap();
+        let found = stray(&ground, &ground, 1.0, 0.05);
+        let columns: Vec<usize> = (0..100).filter(|column| found[(*column, 20)]).collect();
+        assert_eq!(columns, (30..40).chain(80..95).collect::<Vec<usize>>());
+        let known = filled(&ground);
+        assert!(!stray(&ground, &known, 1.0, 0.05).data().contains(&true));
     }
 
     #[test]
     fn ground_of_small_parts_alone_stays() {
         let mut ground = Grid::filled(20, 20, f32::NAN);
         (ground[(3, 3)], ground[(15, 12)]) = (1.0, 50.0);
-        assert!(!stray(&ground, 1.0, 0.05).data().contains(&true));
+        assert!(!stray(&ground, &ground, 1.0, 0.05).data().contains(&true));
     }
 
     #[test]
