@@ -167,13 +167,20 @@ fn a_void_of_a_blank_roof_is_not_taken_for_hidden_ground() {
 }
 
 #[test]
-fn a_small_island_in_a_void_is_kept_and_not_spread() {
-    let mut g = Grid::filled(40, 40, 1.0f32);
-    (5..35).for_each(|x| (5..35).for_each(|y| g[(x, y)] = f32::NAN));
-    (18..22).for_each(|x| (18..22).for_each(|y| g[(x, y)] = 9.0));
-    let found = fill(&mut g);
-    assert!((18..22).all(|x| g[(x, 20)] == 9.0) && g[(17, 20)].is_nan(), "{:?}", g.row(20));
-    assert!((14..26).all(|x| (14..26).all(|y| !found.source[(x, y)].is_filled())));
+fn a_small_island_in_a_void_is_kept_and_spread_only_where_it_is_trusted() {
+    let mut surface = Grid::filled(40, 40, 1.0f32);
+    (10..30).for_each(|x| (10..30).for_each(|y| surface[(x, y)] = f32::NAN));
+    (18..22).for_each(|x| (18..22).for_each(|y| surface[(x, y)] = 9.0));
+    let filled = |is_trusted: bool| {
+        let mut g = surface.clone();
+        let trusted = g.map(|h| *h == 1.0 || is_trusted);
+        let (blind, nowhere) = (g.map(|_| false), g.map(|_| f32::NAN));
+        let known = KnownVoids { trusted: &trusted, blind: &blind, completed_m: &nowhere, ground_m: &nowhere };
+        let found = fill_voids(&mut g, known, |_, voids| vec![f32::NEG_INFINITY; voids.len()], &CONFIG);
+        assert!((18..22).all(|x| (18..22).all(|y| found.source[(x, y)] == CellSource::Observed && g[(x, y)] == 9.0)));
+        (14..18).filter(|x| found.source[(*x, 20)].is_filled()).count()
+    };
+    assert!(filled(false) == 0 && filled(true) > 0);
 }
 
 /// A void between the roofs of two rows of houses, every other one of which is 6 m higher, and
