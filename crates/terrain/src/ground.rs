@@ -128,7 +128,7 @@ pub fn bare_ground_of_observed(
             let evidence_m = without_cells(&surface_m, &islands(&surface_m, work_m));
             (whole_m, surface_m, evidence_m)
         }
-        // Voids between the points of a cloud are usual, and make no islands.
+        // Voids between the points of a cloud are usual: they make no islands, and hide no drops.
         None => {
             let whole_m = without_pits(&whole_m);
             (whole_m.clone(), whole_m.clone(), whole_m)
@@ -153,7 +153,8 @@ pub fn bare_ground_of_observed(
         let again = objects(&heights, (&trend(&known, work_m, &SECOND_TREND), &slope), config, progress)?;
         add(&mut found, &again);
     }
-    let is_stray = stray(&without_cells(&clear_m, &found), &evidence_m, work_m, noise_m);
+    let hidden_m = unobserved.map(|_| &evidence_m);
+    let is_stray = stray(&without_cells(&clear_m, &found), hidden_m, work_m, noise_m);
     let ground = without_ramps(&without_cells(&clear_m, &is_stray), &found, work_m, noise_m);
     let noise_m = noise_of(&ground, work_m);
     let mut ground = rejoined(&without_cells(&surface_m, &is_forest), ground, work_m, noise_m);

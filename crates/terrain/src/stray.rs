@@ -30,11 +30,14 @@ pub(crate) fn islands(surface: &Grid<f32>, cell_m: f64) -> Grid<bool> {
 }
 
 /// Returns the cells of the stray parts of a ground with NaN at everything else: small ones off the
-/// ground around them, and others that stand above it. `surface` is what the ground was found in.
-pub(crate) fn stray(ground: &Grid<f32>, surface: &Grid<f32>, cell_m: f64, noise_m: f64) -> Grid<bool> {
+/// ground around them, and others that stand above it. `surface` is what the ground was found in,
+/// if its voids may hide how far it drops.
+pub(crate) fn stray(ground: &Grid<f32>, surface: Option<&Grid<f32>>, cell_m: f64, noise_m: f64) -> Grid<bool> {
     let mut is_stray = small_strays(ground, cell_m, noise_m);
-    let raised = raised(&without_cells(ground, &is_stray), surface, cell_m);
-    add(&mut is_stray, &raised);
+    if let Some(surface) = surface {
+        let raised = raised(&without_cells(ground, &is_stray), surface, cell_m);
+        add(&mut is_stray, &raised);
+    }
     is_stray
 }
 
@@ -109,7 +112,7 @@ mod tests {
         for (column, height) in [(30, 2.0), (40, 10.3), (50, 9.0), (60, 12.0)] {
             ground[(column, 20)] = height;
         }
-        let found = stray(&ground, &ground, 1.0, 0.05);
+        let found = stray(&ground, Some(&ground), 1.0, 0.05);
         let columns: Vec<usize> = (0..80).filter(|column| found[(*column, 20)]).collect();
         assert_eq!(columns, [30, 60]);
         assert_eq!(found.data().iter().filter(|is| **is).count(), 2);
@@ -125,7 +128,7 @@ mod tests {
             ground.row_mut(row)[45..55].fill(24.0);
             ground.row_mut(row + 20)[45..55].fill(12.0);
         }
-        let found = stray(&ground, &ground, 1.0, 0.05);
+        let found = stray(&ground, Some(&ground), 1.0, 0.05);
         assert!((45..55).all(|column| found[(column, 25)] && !found[(column, 45)]));
         assert_eq!(found.data().iter().filter(|is| **is).count(), 100);
     }
@@ -141,18 +144,18 @@ mod tests {
             _ => f32::NAN,
         };
         let ground = Grid::from_vec(100, 40, (0..4000).map(|at| level(at % 100)).collect()).unwrap();
-        let found = stray(&ground, &ground, 1.0, 0.05);
+        let found = stray(&ground, Some(&ground), 1.0, 0.05);
         let columns: Vec<usize> = (0..100).filter(|column| found[(*column, 20)]).collect();
         assert_eq!(columns, (30..40).chain(80..95).collect::<Vec<usize>>());
         let known = filled(&ground);
-        assert!(!stray(&ground, &known, 1.0, 0.05).data().contains(&true));
+        assert!(!stray(&ground, Some(&known), 1.0, 0.05).data().contains(&true));
     }
 
     #[test]
     fn ground_of_small_parts_alone_stays() {
         let mut ground = Grid::filled(20, 20, f32::NAN);
         (ground[(3, 3)], ground[(15, 12)]) = (1.0, 50.0);
-        assert!(!stray(&ground, &ground, 1.0, 0.05).data().contains(&true));
+        assert!(!stray(&ground, Some(&ground), 1.0, 0.05).data().contains(&true));
     }
 
     #[test]
