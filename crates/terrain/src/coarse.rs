@@ -2,6 +2,9 @@
 
 use raster::Grid;
 
+/// Half-width over which a ground is smoothed, twice, before its slope is taken, metres.
+const SLOPE_HALF_WIDTH_M: f64 = 5.0;
+
 /// Returns the lower median of the known heights of blocks of `side × side` cells.
 pub(crate) fn blocks(fine: &Grid<f32>, side: usize) -> Grid<f32> {
     if side == 1 {
@@ -92,6 +95,12 @@ pub(crate) fn slopes(surface: &Grid<f32>, cell_m: f64) -> Grid<f32> {
         }
     }
     out
+}
+
+/// Returns the slope of banks and quarries, not of walls, in a ground without voids.
+pub(crate) fn smooth_slopes(ground: &Grid<f32>, cell_m: f64) -> Grid<f32> {
+    let radius = (SLOPE_HALF_WIDTH_M / cell_m).round() as usize;
+    slopes(&blurred(&blurred(ground, radius), radius), cell_m)
 }
 
 /// Returns the heights with the cells of a mask as voids.

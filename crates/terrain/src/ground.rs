@@ -6,7 +6,7 @@ use numeric::Progress;
 use raster::Grid;
 
 use crate::canopy::under_forests;
-use crate::coarse::{add, at_cell, blocks, blurred, slopes, widened, without_cells};
+use crate::coarse::{add, at_cell, blocks, slopes, smooth_slopes, widened, without_cells};
 use crate::config::{GroundConfig, NOISE_DEVIATIONS};
 use crate::error::TerrainError;
 use crate::forest::{forests, roughness};
@@ -36,9 +36,6 @@ const WORK_CELL_M: f64 = 1.0;
 const FIRST_TREND: TrendConfig = TrendConfig { half_width_m: 50.0, quantile: 0.1, is_lower: true };
 /// Trend of the ground between the objects of the first search.
 const SECOND_TREND: TrendConfig = TrendConfig { half_width_m: 40.0, quantile: 0.5, is_lower: false };
-/// Half-width over which that ground is smoothed, twice, before its slope is taken, metres: of
-/// banks and quarries, not of walls.
-const SLOPE_HALF_WIDTH_M: f64 = 5.0;
 /// Width of the ring around objects in which ramps and low walls are looked for, metres.
 const RING_M: f64 = 3.0;
 /// Height above the ground around it up to which a cell of the ring, or a cell of the surface, is
@@ -147,10 +144,9 @@ pub fn bare_ground_of_observed(
         let first = trend(&clear_m, work_m, &FIRST_TREND);
         found = objects(&heights, (&first, &slopes(&first, work_m)), config, progress)?;
         let known = filled(&without_cells(&clear_m, &found));
-        let radius = (SLOPE_HALF_WIDTH_M / work_m).round() as usize;
-        let slope = slopes(&blurred(&blurred(&known, radius), radius), work_m);
         // What one of the trends hides, the other shows; ground joins again below.
-        let again = objects(&heights, (&trend(&known, work_m, &SECOND_TREND), &slope), config, progress)?;
+        let second = trend(&known, work_m, &SECOND_TREND);
+        let again = objects(&heights, (&second, &smooth_slopes(&known, work_m)), config, progress)?;
         add(&mut found, &again);
     }
     let hidden_m = unobserved.map(|_| &evidence_m);

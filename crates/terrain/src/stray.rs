@@ -6,7 +6,7 @@
 
 use raster::Grid;
 
-use crate::coarse::{add, blurred, cones, difference, slopes, without_cells};
+use crate::coarse::{add, cones, difference, smooth_slopes, without_cells};
 use crate::membrane::filled;
 use crate::objects::{CLEARING_MIN_M2, FREE_SHARE, STEP_M, STOREY_M};
 use crate::pits::depth_m;
@@ -20,8 +20,6 @@ const SURROUNDINGS: usize = 3;
 /// what that may be steeper, height per distance.
 const STEEP_SHARE: f64 = 0.9;
 const STEEPER: f32 = 0.2;
-/// Half-width over which that ground is smoothed, twice, before its slope is taken, metres.
-const SLOPE_HALF_WIDTH_M: f64 = 5.0;
 
 /// Returns the cells of islands: small parts of a surface with more voids than heights around them.
 pub(crate) fn islands(surface: &Grid<f32>, cell_m: f64) -> Grid<bool> {
@@ -79,8 +77,7 @@ fn raised(ground: &Grid<f32>, surface: &Grid<f32>, cell_m: f64) -> Grid<bool> {
 
 /// Returns the steepest slope that may lie between parts of a ground, height per distance.
 fn steepest(ground: &Grid<f32>, cell_m: f64) -> f32 {
-    let radius = (SLOPE_HALF_WIDTH_M / cell_m).round() as usize;
-    let slopes = slopes(&blurred(&blurred(&filled(ground), radius), radius), cell_m);
+    let slopes = smooth_slopes(&filled(ground), cell_m);
     let known = slopes.data().iter().zip(ground.data()).filter(|(_, h)| !h.is_nan());
     quantile(&mut known.map(|(slope, _)| *slope).collect::<Vec<f32>>(), STEEP_SHARE).unwrap_or(0.0) + STEEPER
 }

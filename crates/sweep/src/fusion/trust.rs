@@ -35,6 +35,11 @@ const ODDS_BASE: f64 = -1.17;
 const ODDS_TOLERANCE: f64 = 0.81;
 /// Increase of the log odds from no agreement to full agreement.
 const ODDS_AGREEMENT: f64 = 5.3;
+/// The same two for filled heights, fitted to their errors on fifteen simulated scenes, each with
+/// equal weight by the root of its cells. They are right in about half of the cells; neither the
+/// deviation nor what is observed around tells much more.
+const FILLED_ODDS_BASE: f64 = 0.49;
+const FILLED_ODDS_TOLERANCE: f64 = 0.15;
 
 /// Parameters of the calibration.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -92,9 +97,8 @@ pub fn calibrate(
         let cells = span(i % width, reach, width).len() * span(i / width, reach, height).len();
         let share = (UNOBSERVED + agreed[i] / cells as f64) / (UNOBSERVED + 1.0);
         let sigma = &mut sigma_m.data_mut()[i];
-        let mut camera_m = 0.0;
-        if is_observed(i) {
-            camera_m = config.camera_m;
+        let is_observed = is_observed(i);
+        if is_observed {
             let log = SIGMA_BASE
                 + SIGMA_SHARPNESS * in_steps(*sigma)
                 + SIGMA_ROUGHNESS * in_steps(roughness_m.data()[i])
@@ -102,8 +106,12 @@ pub fn calibrate(
             *sigma = (config.step_m * log.exp()) as f32;
         }
         let ratio = config.tolerance_m / f64::from(*sigma).max(f64::MIN_POSITIVE);
-        let odds = ODDS_BASE + ODDS_TOLERANCE * ratio.ln() + ODDS_AGREEMENT * share;
+        let odds = match is_observed {
+            true => ODDS_BASE + ODDS_TOLERANCE * ratio.ln() + ODDS_AGREEMENT * share,
+            false => FILLED_ODDS_BASE + FILLED_ODDS_TOLERANCE * ratio.ln(),
+        };
         *confidence = (1.0 / (1.0 + (-odds).exp())) as f32;
+        let camera_m = if is_observed { config.camera_m } else { 0.0 };
         *sigma = f64::from(*sigma).hypot(camera_m) as f32;
     }
     confidence
@@ -171,7 +179,7 @@ mod tests {
             confidence[alone] < 0.6 && confidence[alone] < confidence[rough] && confidence[rough] < confidence[smooth]
         );
         assert_eq!(sigma_m.data()[filled], 2.5);
-        assert!(confidence.data()[filled] < confidence[alone]);
+        assert!((0.5..0.65).contains(&confidence.data()[filled]), "{}", confidence.data()[filled]);
     }
 
     #[test]
