@@ -229,9 +229,9 @@ mod tests {
     }
 
     proptest! {
-        /// A flat splat has, on the ray of each pixel, its opacity where the ray is nearest to it in
-        /// standard deviations that the low-pass widens, and the depth at which the ray meets its
-        /// plane.
+        /// A flat splat has, on the ray of each pixel, its opacity where the ray is nearest to it
+        /// in standard deviations that the low-pass widens, and the depth at which the ray meets
+        /// its plane.
         #[test]
         fn rays_meet_the_plane_of_a_splat(
             position in (-4.0..4.0f64, 2.0..12.0f64, -1.0..4.0f64), normal in prop::array::uniform3(-1.0..1.0f64),

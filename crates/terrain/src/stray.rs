@@ -63,8 +63,8 @@ fn small_strays(ground: &Grid<f32>, cell_m: f64, noise_m: f64) -> Grid<bool> {
 }
 
 /// Returns the cells of parts between voids that stand above the ground of others: a slope to them
-/// would be steeper than the ground is elsewhere. Where less of the border lies at voids, the search
-/// for objects has seen how far the surface drops, and a terrace stays.
+/// would be steeper than the ground is elsewhere. Where less of the border lies at voids, the
+/// search for objects has seen how far the surface drops, and a terrace stays.
 fn raised(ground: &Grid<f32>, surface: &Grid<f32>, cell_m: f64) -> Grid<bool> {
     let parts = parts(ground, cell_m);
     let large = without_cells(ground, &parts.mask(|part| is_small(&parts, part, cell_m)));

@@ -104,8 +104,8 @@ pub(super) fn order_of(camera: &RpcCamera, size: (usize, usize), points: &[Contr
     best.0
 }
 
-/// Returns how many of so many points count as independent: no more than chips fit side by side into
-/// the image, because those that show the same pixels have the same errors.
+/// Returns how many of so many points count as independent: no more than chips fit side by side
+/// into the image, because those that show the same pixels have the same errors.
 fn independent(count: f64, (width, height): (usize, usize)) -> f64 {
     let side = (2 * ChipConfig::default().radius_max + 1) as f64;
     count.min((width as f64 / side) * (height as f64 / side)).max(1.0)
