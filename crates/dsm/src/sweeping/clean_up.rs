@@ -40,6 +40,9 @@ const FILL_REACH_FAR_M: f64 = 60.0;
 /// Voids up to this wide are closed, whatever the images show there, metres: the shadow side of a
 /// house.
 const FILL_NARROW_M: f64 = 10.0;
+/// Side of the smallest island of trusted heights from which voids are filled, metres: a small
+/// house. On glittering water a few cells are trusted by chance.
+const FILL_HOUSE_M: f64 = 5.0;
 /// Heights around a void that differ by more than this per metre between them are two surfaces:
 /// steeper than streets.
 const FILL_SLOPE: f64 = 0.05;
@@ -201,6 +204,7 @@ fn fill_config(fill: Fill, gsd_m: f64) -> FillConfig {
         narrow_cells: (FILL_NARROW_M / gsd_m) as f32,
         blind_reach_cells: (FILL_BLIND_M / gsd_m).ceil() as usize,
         island_cells: (FILL_NARROW_M / gsd_m).powi(2) as usize,
+        trusted_island_cells: (FILL_HOUSE_M / gsd_m).powi(2) as usize,
         same_surface_m: (2.0 * gsd_m) as f32,
         slope_m: (FILL_SLOPE * gsd_m) as f32,
         sigma_slope_m: (FILL_SIGMA_SLOPE * gsd_m) as f32,

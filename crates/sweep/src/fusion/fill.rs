@@ -20,8 +20,8 @@
 //!   Narrow gaps between two such surfaces keep theirs.
 //! - What fewer than two views image is outside and stays open, unless it is narrow.
 //!
-//! Small islands of heights may be chance, so that nothing is filled from those of them that are
-//! not trusted.
+//! Small islands of heights may be chance, so that nothing is filled from them; from trusted ones,
+//! which are more seldom, where they are very small.
 //!
 //! The standard deviation of a filled height holds the spread of all heights that it could have
 //! been filled from, and grows with the distance to the nearest of them.
@@ -97,9 +97,10 @@ pub struct FillConfig {
     pub narrow_cells: f32,
     /// Distance in a void over which blind cells are the reason for it, cells.
     pub blind_reach_cells: usize,
-    /// Smallest number of connected cells with heights from which voids are filled, whether or not
-    /// they are trusted.
+    /// Smallest number of connected cells with heights from which voids are filled.
     pub island_cells: usize,
+    /// The same where all of the heights are trusted.
+    pub trusted_island_cells: usize,
     /// Largest difference of neighbouring heights on one level, metres.
     pub same_surface_m: f32,
     /// Increase of that difference for every cell between the heights, metres.
@@ -165,17 +166,23 @@ pub fn fill_voids(
     let voids: Vec<usize> = (0..height_m.data().len()).filter(|&i| height_m.data()[i].is_nan()).collect();
     let mut source = Grid::filled(width, height, CellSource::Observed);
     let mut sigma_m = Grid::filled(width, height, f32::NAN);
+    let keep_trusted = |heights: &mut Grid<f32>| {
+        let cells = heights.data_mut().iter_mut().zip(trusted.data());
+        cells.filter(|(_, is_trusted)| !**is_trusted).for_each(|(height, _)| *height = f32::NAN);
+    };
     let mut solid = height_m.clone();
-    let cells = solid.data_mut().iter_mut().zip(trusted.data());
-    cells.filter(|(_, is_trusted)| !**is_trusted).for_each(|(height, _)| *height = f32::NAN);
+    keep_trusted(&mut solid);
     let bounds = bound_m(&solid, &voids);
     let mut sources = height_m.clone();
     remove_speckle(&mut sources, f32::INFINITY, config.island_cells);
-    let islands = sources.data_mut().iter_mut().zip(solid.data()).filter(|(source, _)| source.is_nan());
+    let mut solid_islands = solid.clone();
+    remove_speckle(&mut solid_islands, f32::INFINITY, config.trusted_island_cells);
+    let islands = sources.data_mut().iter_mut().zip(solid_islands.data()).filter(|(source, _)| source.is_nan());
     islands.for_each(|(source, solid)| *source = *solid);
     let around = around(&sources, blind, &voids, config.reach_cells as f32);
     let (numbers, count) = number_voids(height_m);
-    let border = Border::new(&solid, &numbers);
+    keep_trusted(&mut sources);
+    let border = Border::new(&sources, &numbers);
     let planes = border_planes(border.cells(), count, config.same_surface_m);
     let beside_blind = beside(blind, &numbers, config.blind_reach_cells);
     let filling = Filling {

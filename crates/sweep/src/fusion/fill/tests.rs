@@ -9,6 +9,7 @@ const CONFIG: FillConfig = FillConfig {
     narrow_cells: 6.0,
     blind_reach_cells: 4,
     island_cells: 36,
+    trusted_island_cells: 16,
     same_surface_m: 1.0,
     slope_m: 0.05,
     sigma_slope_m: 0.1,
@@ -167,20 +168,21 @@ fn a_void_of_a_blank_roof_is_not_taken_for_hidden_ground() {
 }
 
 #[test]
-fn a_small_island_in_a_void_is_kept_and_spread_only_where_it_is_trusted() {
+fn a_small_island_in_a_void_is_kept_and_spread_only_where_it_is_trusted_and_not_very_small() {
     let mut surface = Grid::filled(40, 40, 1.0f32);
     (10..30).for_each(|x| (10..30).for_each(|y| surface[(x, y)] = f32::NAN));
     (18..22).for_each(|x| (18..22).for_each(|y| surface[(x, y)] = 9.0));
-    let filled = |is_trusted: bool| {
+    let filled = |is_trusted: bool, trusted_island_cells: usize| {
         let mut g = surface.clone();
         let trusted = g.map(|h| *h == 1.0 || is_trusted);
         let (blind, nowhere) = (g.map(|_| false), g.map(|_| f32::NAN));
         let known = KnownVoids { trusted: &trusted, blind: &blind, completed_m: &nowhere, ground_m: &nowhere };
-        let found = fill_voids(&mut g, known, |_, voids| vec![f32::NEG_INFINITY; voids.len()], &CONFIG);
+        let config = FillConfig { trusted_island_cells, ..CONFIG };
+        let found = fill_voids(&mut g, known, |_, voids| vec![f32::NEG_INFINITY; voids.len()], &config);
         assert!((18..22).all(|x| (18..22).all(|y| found.source[(x, y)] == CellSource::Observed && g[(x, y)] == 9.0)));
         (14..18).filter(|x| found.source[(*x, 20)].is_filled()).count()
     };
-    assert!(filled(false) == 0 && filled(true) > 0);
+    assert!(filled(false, 16) == 0 && filled(true, 17) == 0 && filled(true, 16) > 0);
 }
 
 /// A void between the roofs of two rows of houses, every other one of which is 6 m higher, and
