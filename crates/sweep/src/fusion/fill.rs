@@ -20,8 +20,8 @@
 //!   Narrow gaps between two such surfaces keep theirs.
 //! - What fewer than two views image is outside and stays open, unless it is narrow.
 //!
-//! Small islands of heights may be chance, so that nothing is filled from them; from trusted ones,
-//! which are more seldom, where they are very small.
+//! Small islands of heights may be chance, so that nothing is filled from them. Trusted ones are
+//! chance only where they are very small.
 //!
 //! The standard deviation of a filled height holds the spread of all heights that it could have
 //! been filled from, and grows with the distance to the nearest of them.
