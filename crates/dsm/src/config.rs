@@ -27,11 +27,11 @@ const TILE_DEFAULT: usize = 1024;
 pub enum Preset {
     /// Half the resolution of the images in matching and in the DSM, and two sources per view.
     Fast,
-    /// Full resolution and up to four sources per view.
+    /// Full resolution, up to four sources per view, and two lattices of pixels.
     #[default]
     Balanced,
-    /// Full resolution, up to eight sources per view, a wider search around the heights of coarse
-    /// levels, and sharper edges of roofs.
+    /// Full resolution, up to eight sources per view, four lattices of pixels, and sharper edges of
+    /// roofs.
     Accurate,
 }
 
@@ -39,8 +39,12 @@ impl Preset {
     /// All values with the names that people give them, and their meanings.
     pub const CHOICES: [(&'static str, Self, &'static str); 3] = [
         ("fast", Self::Fast, "half the resolution in matching and in the DSM, two sources per view"),
-        ("balanced", Self::Balanced, "full resolution, up to four sources per view"),
-        ("accurate", Self::Accurate, "full resolution, up to eight sources per view, wider search"),
+        ("balanced", Self::Balanced, "full resolution, up to four sources per view, matched on two lattices of pixels"),
+        (
+            "accurate",
+            Self::Accurate,
+            "full resolution, up to eight sources per view, matched on four lattices of pixels",
+        ),
     ];
 }
 

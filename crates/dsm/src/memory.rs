@@ -18,6 +18,8 @@ const BASE: u64 = 200_000_000;
 /// Bytes per pixel of all views while they are swept: the image with its pyramid (16/3), the
 /// heights of two levels with deviation, confidence and support (16 + 4).
 const SWEPT_BYTES_PER_PIXEL: u64 = 26;
+/// The same for each further lattice of pixels: its image (4) and heights (16).
+const SWEPT_BYTES_PER_LATTICE: u64 = 20;
 /// Bytes per pixel of a view in work: the ranges of hypotheses and steep surfaces (10) with their
 /// inputs (4).
 const RANGES_BYTES_PER_PIXEL: u64 = 14;
@@ -28,11 +30,15 @@ const VIEWS_PER_THREAD: usize = 2;
 /// (20), the heights (4), and where the image shows something (2). One that is not yet has its
 /// image and heights (20).
 const PLACED_BYTES_PER_PIXEL: u64 = 26;
+/// The same for each further lattice of pixels: vertices (20) and heights (4).
+const PLACED_BYTES_PER_LATTICE: u64 = 24;
 /// Bytes per pixel of the view that is being placed, besides: its vertices as tiles (20), the
 /// weights of borders (8), and the masks of pixels that count (5), without what the others free.
 const PLACING_BYTES_PER_PIXEL: u64 = 33;
 /// Bytes per pixel when only the vertices are left, and where the images show something.
 const VERTEX_BYTES_PER_PIXEL: u64 = 22;
+/// The same for each further lattice of pixels.
+const VERTEX_BYTES_PER_LATTICE: u64 = 20;
 /// Bytes per cell while the views are placed: the mask of cells that no view can see.
 const PLACED_BYTES_PER_CELL: u64 = 2;
 /// Bytes per cell at the end: four results twice, before and after the clean-up (26), with the
@@ -55,32 +61,35 @@ pub(crate) fn area(w: &Window) -> u64 {
     (w.width as u64).saturating_mul(w.height as u64)
 }
 
-/// Returns the memory needed to sweep views of `pixels` pixels each onto `cells` cells at once,
-/// megabytes.
-pub(crate) fn needed_mb(pixels: &[u64], cells: u64) -> u64 {
+/// Returns the memory needed to sweep views of `pixels` pixels each on `lattices` lattices onto
+/// `cells` cells at once, megabytes.
+pub(crate) fn needed_mb(pixels: &[u64], cells: u64, lattices: usize) -> u64 {
     let largest = pixels.iter().copied().max().unwrap_or(0);
     let threads = rayon::current_num_threads();
     let blocks = BYTES_PER_BLOCK_PIXEL * BLOCK_PIXELS.min(largest) * threads as u64;
     let views = pixels.len().min(VIEWS_PER_THREAD * threads) as u64;
-    with_work(pixels, cells, blocks.saturating_add(largest.saturating_mul(RANGES_BYTES_PER_PIXEL * views)))
+    with_work(pixels, cells, lattices, blocks.saturating_add(largest.saturating_mul(RANGES_BYTES_PER_PIXEL * views)))
 }
 
 /// Returns the part of [`needed_mb`] that does not depend on the number of threads, megabytes.
-pub(crate) fn least_mb(pixels: &[u64], cells: u64) -> u64 {
-    with_work(pixels, cells, 0)
+pub(crate) fn least_mb(pixels: &[u64], cells: u64, lattices: usize) -> u64 {
+    with_work(pixels, cells, lattices, 0)
 }
 
 /// Returns the memory needed when the sweep's views and blocks in work take `in_work` bytes,
 /// megabytes.
-fn with_work(pixels: &[u64], cells: u64, in_work: u64) -> u64 {
+fn with_work(pixels: &[u64], cells: u64, lattices: usize, in_work: u64) -> u64 {
+    let more = lattices.saturating_sub(1) as u64;
     let all = pixels.iter().fold(0, |sum: u64, p| sum.saturating_add(*p));
     let placing = pixels.iter().copied().max().unwrap_or(0).saturating_mul(PLACING_BYTES_PER_PIXEL);
-    let stage =
-        |per_pixel: u64, per_cell: u64| all.saturating_mul(per_pixel).saturating_add(cells.saturating_mul(per_cell));
+    let stage = |per_pixel: u64, per_lattice: u64, per_cell: u64| {
+        let per_pixel = per_pixel.saturating_add(more.saturating_mul(per_lattice));
+        all.saturating_mul(per_pixel).saturating_add(cells.saturating_mul(per_cell))
+    };
     let stages = [
-        stage(SWEPT_BYTES_PER_PIXEL, 0).saturating_add(in_work),
-        stage(PLACED_BYTES_PER_PIXEL, PLACED_BYTES_PER_CELL).saturating_add(placing),
-        stage(VERTEX_BYTES_PER_PIXEL, FUSED_BYTES_PER_CELL),
+        stage(SWEPT_BYTES_PER_PIXEL, SWEPT_BYTES_PER_LATTICE, 0).saturating_add(in_work),
+        stage(PLACED_BYTES_PER_PIXEL, PLACED_BYTES_PER_LATTICE, PLACED_BYTES_PER_CELL).saturating_add(placing),
+        stage(VERTEX_BYTES_PER_PIXEL, VERTEX_BYTES_PER_LATTICE, FUSED_BYTES_PER_CELL),
     ];
     BASE.saturating_add(stages.into_iter().fold(0, u64::max)) / 1_000_000
 }

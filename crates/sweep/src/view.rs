@@ -1,8 +1,8 @@
 //! Views: image pyramids with their cameras.
 
-use camera::RpcCamera;
+use camera::{ImagePoint, RpcCamera};
 use numeric::{order_statistic, upper_median};
-use raster::{Grid, Pyramid, Window};
+use raster::{Grid, Pyramid, Window, bicubic_along};
 
 /// Variance of the rounding error of integer grey values.
 pub(crate) const QUANTISATION_VARIANCE: f32 = 1.0 / 12.0;
@@ -116,6 +116,29 @@ impl SweepView {
     pub fn absent(camera: RpcCamera) -> Self {
         let levels = vec![Grid::filled(0, 0, f32::NAN); LEVELS_MAX];
         Self { camera, levels, noise: 0.0, contrast: vec![0.0; LEVELS_MAX], first: [0; 2] }
+    }
+
+    /// Returns the view with one level only, whose pixels lie `offset_px` (columns, rows; pixels of
+    /// the level) further on the same image. Values between pixels are bicubic.
+    #[must_use]
+    pub fn on_lattice(&self, level: usize, offset_px: [f64; 2]) -> Self {
+        let image = &self.levels[level];
+        let mut moved = Grid::filled(image.width(), image.height(), f32::NAN);
+        for y in 0..image.height() {
+            let row = moved.row_mut(y);
+            bicubic_along(image, [offset_px[0], offset_px[1] + y as f64], [1.0, 0.0], row);
+            row.iter_mut().filter(|v| v.is_nan()).for_each(|v| *v = f32::NAN);
+        }
+        let mut levels = vec![Grid::filled(0, 0, f32::NAN); self.levels.len()];
+        levels[level] = moved;
+        let [column, row] = offset_px.map(|px| px * f64::from(1u32 << level));
+        Self {
+            camera: self.camera.cropped(ImagePoint::new(column, row)),
+            levels,
+            noise: self.noise,
+            contrast: self.contrast.clone(),
+            first: self.first,
+        }
     }
 
     /// Returns the view on one level; `index` is its index among the views.
@@ -248,6 +271,25 @@ mod tests {
         assert_eq!(sides(&view), [0, 64, 0]);
         view.keep_level(view.levels.len());
         assert_eq!(sides(&view), [0; 3]);
+    }
+
+    #[test]
+    fn a_view_on_another_lattice_shows_the_same_places() {
+        let ramp = |i: usize| 2.0 * (i % 64) as f32 - 3.0 * (i / 64) as f32;
+        let mut image = Grid::from_vec(64, 64, (0..64 * 64).map(ramp).collect()).unwrap();
+        image[(40, 20)] = f32::NAN;
+        let view = SweepView::new(crate::testing::camera::leaning_camera(64, [0.3, -0.2]), image);
+        let moved = view.on_lattice(1, [0.5, 0.25]);
+        let sides: Vec<usize> = moved.levels.iter().map(Grid::width).collect();
+        assert_eq!(sides, [0, 32]);
+        // A column of level 1 is two of level 0, and a row as well.
+        let by = 2.0 * 2.0 * 0.5 - 3.0 * 2.0 * 0.25;
+        assert!((moved.levels[1][(5, 7)] - view.levels[1][(5, 7)] - by).abs() < 1e-4);
+        assert!(moved.levels[1][(31, 7)].is_nan());
+        assert!(view.on_lattice(0, [0.5, 0.25]).levels[0][(40, 20)].is_nan());
+        let ground = geodesy::LonLatHeight { lon_deg: 1e-5, lat_deg: 2e-5, height_m: 10.0 };
+        let [own, shifted] = [&view, &moved].map(|view| view.camera.project(ground).unwrap());
+        assert!((own.sample - shifted.sample - 1.0).abs() < 1e-9 && (own.line - shifted.line - 0.5).abs() < 1e-9);
     }
 
     #[test]

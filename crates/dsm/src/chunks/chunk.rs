@@ -134,6 +134,7 @@ fn sweep_chunk(
         sources: work.sources.clone(),
         reach: plan.tuning.reaches(),
         jump_at_edge: plan.tuning.jump_at_edge,
+        lattices_px: plan.tuning.lattices_px(),
         priors: Vec::new(),
     };
     let mut ids: &[String] = &[];
@@ -142,7 +143,7 @@ fn sweep_chunk(
         sweep.priors = prior.seen_from(&views, plan.pixel_m)?;
         ids = &prior.ids;
     }
-    progress.begin("sweeping heights", views.len() * work.levels.count());
+    progress.begin("sweeping heights", views.len() * sweep.maps_per_view());
     let heights = sweep_scene(&views, &sweep, progress)?;
     let (hypotheses, findings) = (heights.hypotheses, heights.findings.clone().named(ids));
     if is_whole {

@@ -217,7 +217,7 @@ impl ChunkPlanner<'_> {
             },
         };
         let windows = self.windows(&grid, height_range, &used(&sources))?;
-        let needed_mb = needed_mb(&windows.iter().copied().flatten().collect::<Vec<_>>(), &grid);
+        let needed_mb = needed_mb(self.config, &windows.iter().copied().flatten().collect::<Vec<_>>(), &grid);
         if needed_mb > limit_mb {
             return too_large(needed_mb);
         }
@@ -323,6 +323,7 @@ impl ChunkPlanner<'_> {
             sources,
             reach: self.tuning.reaches(),
             jump_at_edge: self.tuning.jump_at_edge,
+            lattices_px: &[],
             priors: Vec::new(),
         };
         let found = probe::seen_range(&views, &sweep, self.range, &Muted(self.progress))?;

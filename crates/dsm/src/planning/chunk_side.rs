@@ -58,7 +58,7 @@ pub(crate) fn choose_side(
             Ok(aligned(span).intersection(&image.whole()))
         };
         let windows = images.iter().map(window).collect::<Result<Vec<_>, DsmError>>()?;
-        Ok::<u64, DsmError>(needed_mb(&windows.into_iter().flatten().collect::<Vec<_>>(), &extent))
+        Ok::<u64, DsmError>(needed_mb(config, &windows.into_iter().flatten().collect::<Vec<_>>(), &extent))
     };
     if let Some(side) = config.chunk {
         return memory::check(config, needed(side)?).map(|()| side);
@@ -73,9 +73,9 @@ pub(crate) fn choose_side(
 }
 
 /// Returns the memory needed to compute a grid from windows of the images, megabytes.
-pub(crate) fn needed_mb(windows: &[Window], grid: &DsmGrid) -> u64 {
+pub(crate) fn needed_mb(config: &DsmConfig, windows: &[Window], grid: &DsmGrid) -> u64 {
     let pixels: Vec<u64> = windows.iter().map(memory::area).collect();
-    memory::needed_mb(&pixels, memory::area(&grid.whole()))
+    memory::needed_mb(&pixels, memory::area(&grid.whole()), config.preset.tuning().lattices)
 }
 
 /// Returns the cells of a core with its rim, inside the grid.

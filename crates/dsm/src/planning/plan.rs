@@ -215,7 +215,7 @@ impl PlannedScene<'_> {
         let core = self.grid.whole();
         let sweep = ChunkSweep {
             extent: core,
-            needed_mb: needed_mb(&windows, self.grid),
+            needed_mb: needed_mb(self.config, &windows, self.grid),
             windows: windows.into_iter().map(Some).collect(),
             sources: self.sources.to_vec(),
             height_range: range,
@@ -247,6 +247,7 @@ impl PlannedScene<'_> {
             sources: self.sources.to_vec(),
             reach: self.tuning.reaches(),
             jump_at_edge: self.tuning.jump_at_edge,
+            lattices_px: &[],
             priors: Vec::new(),
         };
         let found = probe::extended_range(&views, &sweep, self.pixel_m, sides, &Muted(session.progress));

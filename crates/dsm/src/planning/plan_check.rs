@@ -306,7 +306,7 @@ impl ChunkSweep {
             choose_levels(self.height_range, plan.step_m, &smallest_sides(self.windows.iter().flatten()), &plan.tuning);
         ensure(self.levels == levels, || format!("has the pyramid {:?}, expected {levels:?}", self.levels))?;
         let pixels: Vec<u64> = self.windows.iter().flatten().map(memory::area).collect();
-        let least_mb = memory::least_mb(&pixels, memory::area(&self.extent));
+        let least_mb = memory::least_mb(&pixels, memory::area(&self.extent), plan.tuning.lattices);
         let limit_mb = memory::limit_mb(&plan.config);
         ensure(least_mb <= limit_mb, || format!("takes at least {least_mb} MB, allowed are {limit_mb} MB"))
     }

@@ -8,6 +8,7 @@
 //! no ties, it is repeated at all heights at which the images share ground, see [`SharedHeights`].
 
 use camera::RpcCamera;
+use raster::Window;
 use sweep::pointing::TieConfig;
 
 use crate::config::{DsmConfig, Preset};
@@ -17,7 +18,7 @@ use crate::images::image_pixels::read_views;
 use crate::images::order::as_given;
 use crate::images::scene_image::SceneImage;
 use crate::memory;
-use crate::planning::chunk_side::choose_side;
+use crate::planning::chunk_side::{choose_side, needed_mb};
 use crate::planning::grid::{DsmGrid, choose_grid};
 use crate::planning::view_geometry::ViewGeometry;
 use crate::pointing::partners::tie_pairs;
@@ -145,9 +146,9 @@ fn look_at(
 /// Returns whether the scene may be computed at once: it fits the memory, and smaller chunks are
 /// not asked for.
 fn fits(config: &DsmConfig, images: &[SceneImage], grid: &DsmGrid) -> bool {
-    let pixels: Vec<u64> = images.iter().map(|image| memory::area(&image.whole())).collect();
+    let windows: Vec<Window> = images.iter().map(SceneImage::whole).collect();
     let is_one_chunk = config.chunk.is_none_or(|side| side >= grid.size.0.max(grid.size.1));
-    is_one_chunk && memory::needed_mb(&pixels, memory::area(&grid.whole())) <= memory::limit_mb(config)
+    is_one_chunk && needed_mb(config, &windows, grid) <= memory::limit_mb(config)
 }
 
 /// Returns the useful pairs, or those of them that are asked for.

@@ -68,11 +68,13 @@ struct Sample {
 
 impl ViewPrior {
     /// Returns the heights of a level: those of the pixel in the middle of each coarse pixel, so
-    /// that edges stay sharp.
-    pub(crate) fn at_level(&self, level: usize, (width, height): (usize, usize)) -> Grid<f32> {
+    /// that edges stay sharp. The pixels lie `offset_px` further (columns, rows; pixels of the
+    /// level).
+    pub(crate) fn at_level(&self, level: usize, (width, height): (usize, usize), offset_px: [f64; 2]) -> Grid<f32> {
         let side = 1usize << level;
-        let place = |i: usize, n: usize| (i * side + side / 2).min(n - 1);
-        let of = |x, y| self.height_m[(place(x, self.height_m.width()), place(y, self.height_m.height()))];
+        let [right, down] = offset_px.map(|px| (px * side as f64).round() as usize + side / 2);
+        let place = |i: usize, offset: usize, n: usize| (i * side + offset).min(n - 1);
+        let of = |x, y| self.height_m[(place(x, right, self.height_m.width()), place(y, down, self.height_m.height()))];
         let mut out = Grid::filled(width, height, f32::NAN);
         out.data_mut().iter_mut().enumerate().for_each(|(i, h)| *h = of(i % width, i / width));
         out
@@ -238,8 +240,9 @@ mod tests {
     fn coarse_heights_are_those_of_the_middle() {
         let height_m = Grid::from_vec(5, 4, (0..20).map(|i| i as f32).collect()).unwrap();
         let prior = ViewPrior { object: height_m.map(|_| 1), height_m, gsd_m: 0.5 };
-        assert_eq!(prior.at_level(1, (2, 2)).data(), [6.0, 8.0, 16.0, 18.0]);
-        assert_eq!(prior.at_level(0, (5, 4)), prior.height_m);
-        assert_eq!(prior.at_level(2, (1, 1)).data(), [12.0]);
+        assert_eq!(prior.at_level(1, (2, 2), [0.0; 2]).data(), [6.0, 8.0, 16.0, 18.0]);
+        assert_eq!(prior.at_level(0, (5, 4), [0.0; 2]), prior.height_m);
+        assert_eq!(prior.at_level(2, (1, 1), [0.0; 2]).data(), [12.0]);
+        assert_eq!(prior.at_level(1, (2, 2), [0.5, 0.0]).data(), [7.0, 9.0, 17.0, 19.0]);
     }
 }

@@ -7,6 +7,8 @@ use crate::{ChunkWork, Plan, Preset};
 /// Processor seconds that a megapixel of a view takes per source at full resolution, from
 /// `benches/results/scale.md`.
 const SECONDS_PER_MPX: f64 = 1.06;
+/// Share of that which the finest level takes on each further lattice of pixels.
+const PER_LATTICE: f64 = 0.3;
 /// Share of that at half the resolution.
 const HALF_RESOLUTION: f64 = 0.25;
 /// Memory of the libraries and of GDAL's block cache while chunks are merged, bytes.
@@ -45,7 +47,11 @@ pub struct ChunkEstimate {
 impl PlanEstimate {
     /// Estimates what a plan will take.
     pub fn of(plan: &Plan) -> Self {
-        let share = if plan.config.preset == Preset::Fast { HALF_RESOLUTION } else { 1.0 };
+        let lattices = plan.tuning.lattices as f64;
+        let share = match plan.config.preset {
+            Preset::Fast => HALF_RESOLUTION,
+            Preset::Balanced | Preset::Accurate => 1.0 + PER_LATTICE * (lattices - 1.0),
+        };
         let one = |work: &ChunkWork| {
             let ChunkWork::Sweep(sweep) = work else { return ChunkEstimate::default() };
             let pixels = |window: &Option<raster::Window>| window.map_or(0.0, |w| w.width as f64 * w.height as f64);

@@ -3,6 +3,12 @@
 //! The coarsest level covers the whole height range. Each finer level searches, per pixel, around
 //! the heights that the coarser level found at this pixel and next to it. Before a city
 //! model is used, the coarse levels are swept without it, to tell which of its buildings are there.
+//!
+//! Matching depends on where the pixels lie: a blunder on one lattice of pixels is often none on
+//! another, and edges fall between other pixels. The finest level may therefore be swept on several
+//! lattices, each the same image resampled, whose heights are fused (the idea of cycle spinning:
+//! Coifman and Donoho 1995, "Translation-invariant de-noising"). The other images of a cost stay as
+//! they are.
 
 use std::collections::BTreeMap;
 
@@ -45,6 +51,9 @@ pub(crate) struct SceneSweep {
     pub(crate) reach: Reach,
     /// Penalty of a jump across the strongest image edges on the finest level.
     pub(crate) jump_at_edge: u8,
+    /// Lattices of pixels beside the images' own on which the finest level is swept: columns and
+    /// rows, pixels of that level.
+    pub(crate) lattices_px: &'static [[f64; 2]],
     /// For each view, what it sees of a city model; empty without a model.
     pub(crate) priors: Vec<Option<ViewPrior>>,
 }
@@ -54,6 +63,11 @@ impl SceneSweep {
     pub(crate) fn step_at(&self, level: usize) -> f64 {
         self.step_m * f64::from(1u32 << level)
     }
+
+    /// Returns the number of height maps that a view gets.
+    pub(crate) fn maps_per_view(&self) -> usize {
+        self.levels.count() + self.lattices_px.len()
+    }
 }
 
 /// Heights of all views on the finest level.
@@ -61,14 +75,25 @@ impl SceneSweep {
 pub(crate) struct SceneHeights {
     /// One map per view.
     pub(crate) maps: Vec<HeightMap>,
+    /// The same on other lattices of pixels than the images' own.
+    pub(crate) shifted: Vec<LatticeHeights>,
     /// Number of pixel-hypothesis pairs evaluated over all views and levels.
     pub(crate) hypotheses: u64,
     /// Agreement of the heights of the last coarse level with the city model.
     pub(crate) findings: PriorFindings,
 }
 
-/// Sweeps all views from the coarsest level to the finest. Each view and level is a step of
-/// `progress`.
+/// Heights of all views on one lattice of pixels.
+#[derive(Debug, Clone)]
+pub(crate) struct LatticeHeights {
+    /// The views with the finest level on the lattice.
+    pub(crate) views: Vec<SweepView>,
+    /// One map per view.
+    pub(crate) maps: Vec<HeightMap>,
+}
+
+/// Sweeps all views from the coarsest level to the finest, and the finest on all lattices. Each
+/// height map of a view is a step of `progress`.
 ///
 /// # Errors
 /// [`DsmError::Sweep`] as [`sweep_level`], [`DsmError::Cancelled`] between two levels.
@@ -86,8 +111,31 @@ pub(crate) fn sweep_scene(
     } else {
         none
     };
-    let SweptLevels { maps, hypotheses } = sweep_down(views, sweep, finest, &model.priors, progress)?;
-    Ok(SceneHeights { maps, hypotheses: hypotheses + model.hypotheses, findings: model.findings })
+    let coarse = sweep_down(views, sweep, finest + 1, &model.priors, progress)?;
+    let mut hypotheses = model.hypotheses + coarse.hypotheses;
+    let mut finest_on = |lattice: Lattice<'_>| {
+        progress.check_cancelled()?;
+        let swept = sweep_views(views, sweep, lattice, (finest, &coarse.maps), &model.priors, progress)?;
+        hypotheses += swept.hypotheses;
+        Ok::<_, DsmError>(swept.maps)
+    };
+    let maps = finest_on(Lattice { references: views, offset_px: [0.0; 2] })?;
+    let mut shifted = Vec::with_capacity(sweep.lattices_px.len());
+    for &offset_px in sweep.lattices_px {
+        let references: Vec<SweepView> = views.par_iter().map(|view| view.on_lattice(finest, offset_px)).collect();
+        let maps = finest_on(Lattice { references: &references, offset_px })?;
+        shifted.push(LatticeHeights { views: references, maps });
+    }
+    Ok(SceneHeights { maps, shifted, hypotheses, findings: model.findings })
+}
+
+/// A lattice of pixels.
+#[derive(Clone, Copy)]
+struct Lattice<'a> {
+    /// The views on the lattice.
+    references: &'a [SweepView],
+    /// Place of its pixels against those of the images, pixels of the level.
+    offset_px: [f64; 2],
 }
 
 /// Heights of all views after several levels.
@@ -109,21 +157,36 @@ fn sweep_down(
     let mut out = SweptLevels { maps: Vec::new(), hypotheses: 0 };
     for level in (last..=sweep.levels.coarsest).rev() {
         progress.check_cancelled()?;
-        let swept: Vec<(HeightMap, u64)> = (0..views.len())
-            .into_par_iter()
-            .map(|i| {
-                let out = sweep_view(views, sweep, i, level, out.maps.get(i), priors[i].as_ref());
-                progress.step();
-                out
-            })
-            .collect::<Result<_, SweepError>>()?;
-        out.hypotheses += swept.iter().map(|(_, n)| n).sum::<u64>();
-        out.maps = swept.into_iter().map(|(map, _)| map).collect();
+        let own = Lattice { references: views, offset_px: [0.0; 2] };
+        let swept = sweep_views(views, sweep, own, (level, &out.maps), priors, progress)?;
+        out = SweptLevels { maps: swept.maps, hypotheses: out.hypotheses + swept.hypotheses };
         if level > sweep.levels.finest {
             out.maps = drop_lone_heights(views, sweep, &out.maps, level as u32)?;
         }
     }
     Ok(out)
+}
+
+/// Sweeps all views on one level and lattice, around the heights of the coarser level if there are
+/// any.
+fn sweep_views(
+    views: &[SweepView],
+    sweep: &SceneSweep,
+    lattice: Lattice<'_>,
+    (level, coarser): (usize, &[HeightMap]),
+    priors: &[Option<ViewPrior>],
+    progress: &dyn Progress,
+) -> Result<SweptLevels, SweepError> {
+    let swept: Vec<(HeightMap, u64)> = (0..views.len())
+        .into_par_iter()
+        .map(|i| {
+            let out = sweep_view(views, sweep, (i, lattice), (level, coarser.get(i)), priors[i].as_ref());
+            progress.step();
+            out
+        })
+        .collect::<Result<_, SweepError>>()?;
+    let hypotheses = swept.iter().map(|(_, n)| n).sum();
+    Ok(SweptLevels { maps: swept.into_iter().map(|(map, _)| map).collect(), hypotheses })
 }
 
 /// A city model at its place in the images, without the buildings that they refute.
@@ -160,13 +223,12 @@ fn place_model(sweep: &SceneSweep, alone: &SweptLevels, level: usize) -> PlacedM
 fn sweep_view(
     views: &[SweepView],
     sweep: &SceneSweep,
-    index: usize,
-    level: usize,
-    coarser: Option<&HeightMap>,
+    (index, lattice): (usize, Lattice<'_>),
+    (level, coarser): (usize, Option<&HeightMap>),
     known: Option<&ViewPrior>,
 ) -> Result<(HeightMap, u64), SweepError> {
     let origin_m = sweep.range.middle_m();
-    let reference = views[index].on_level(index, level);
+    let reference = lattice.references[index].on_level(index, level);
     let (w, h) = (reference.image.width(), reference.image.height());
     if sweep.sources[index].is_empty() {
         return Ok((HeightMap::empty(w, h, origin_m), 0));
@@ -178,7 +240,7 @@ fn sweep_view(
         Some(c) => Ranges::from_coarser(w, h, step, &c.height_m, c.origin_m, range, sweep.reach),
     }
     .without_voids(reference.image);
-    let prior_m = known.map(|prior| prior.at_level(level, (w, h)));
+    let prior_m = known.map(|prior| prior.at_level(level, (w, h), lattice.offset_px));
     let prior = prior_m.as_ref().map(|height_m| Prior { height_m, deviation_m: DEVIATION_M });
     let ranges = match prior {
         Some(prior) => prior.widened(ranges),

@@ -19,7 +19,7 @@ use crate::planning::grid::DsmGrid;
 use crate::sweeping::clean_up::{Lengths, Voids, clean_up};
 use crate::sweeping::grid_sight::{ViewPixels, grid_sights};
 use crate::sweeping::ground_mask::GroundMask;
-use crate::sweeping::scene_sweep::{SceneHeights, SceneSweep};
+use crate::sweeping::scene_sweep::{LatticeHeights, SceneHeights, SceneSweep};
 use crate::sweeping::shadow_side::ShadowCounts;
 use crate::values::{HeightRange, ImagePair};
 
@@ -135,51 +135,52 @@ pub(crate) fn make_surface(
     let level = finest as u32;
     let jump_m = same_surface_m(sweep, grid);
     let (side_m, step_m) = (input.pixel_m * f64::from(1u32 << level), sweep.step_at(finest));
-    let SceneHeights { mut maps, .. } = heights;
-    let origin_m = maps[0].origin_m;
     views.iter_mut().for_each(|view| view.keep_level(finest));
-    let mut placed = Vec::with_capacity(maps.len());
-    let mut pixels = Vec::with_capacity(maps.len());
-    let mut kept = vec![KeptPixels::default(); views.len()];
+    let SceneHeights { maps, shifted, .. } = heights;
+    let origin_m = maps[0].origin_m;
+    let mut lattices = vec![LatticeHeights { views, maps }];
+    lattices.extend(shifted);
+    let count = lattices[0].views.len();
+    let mut placed = Vec::with_capacity(count * lattices.len());
+    let mut pixels = Vec::with_capacity(count);
+    let mut kept = vec![KeptPixels::default(); count];
     let mut blind = Grid::filled(grid.size.0, grid.size.1, false);
-    for index in 0..views.len() {
+    for index in 0..count {
         if !sweep.sources[index].is_empty() {
             progress.check_cancelled()?;
-            let all = with_heights(sweep, &views, &maps);
-            let own = Heights { index, view: &views[index], map: &maps[index] };
-            let blank = own.view.blank(finest);
-            let mut keep = agreeing(own, &witnesses(own, &all, useful, &sweep.sources), level)?;
-            drop_at_rim(&mut keep, own.map, sweep.range, step_m);
-            let mut shows_nothing = blank.clone();
-            if let Some(asked) = config.height_range_m {
-                drop_outside(&mut keep, own.map, asked);
-                let heights = own.map.height_m.data();
-                shows_nothing
-                    .data_mut()
-                    .iter_mut()
-                    .zip(heights)
-                    .for_each(|(m, h)| *m |= is_outside(own.map, *h, asked));
+            for (number, LatticeHeights { views, maps }) in lattices.iter().enumerate() {
+                let all = with_heights(sweep, views, maps);
+                let own = Heights { index, view: &views[index], map: &maps[index] };
+                let blank = own.view.blank(finest);
+                let mut keep = agreeing(own, &witnesses(own, &all, useful, &sweep.sources), level)?;
+                drop_at_rim(&mut keep, own.map, sweep.range, step_m);
+                if let Some(asked) = config.height_range_m {
+                    drop_outside(&mut keep, own.map, asked);
+                }
+                if number == 0 {
+                    mark_cells(own, level, &shows_nothing(own.map, &blank, config), &frame, &mut blind)?;
+                    let data = keep.data();
+                    kept[index] = KeptPixels {
+                        kept: data.iter().filter(|k| **k).count() as u64,
+                        all: data.len() as u64,
+                        shadows: ShadowCounts::of(&own.view.levels[finest], own.map, &keep, side_m, step_m),
+                    };
+                }
+                placed.push(place_view(own, level, &keep, &blank, jump_m, &frame)?);
             }
-            mark_cells(own, level, &shows_nothing, &frame, &mut blind)?;
-            let data = keep.data();
-            kept[index] = KeptPixels {
-                kept: data.iter().filter(|k| **k).count() as u64,
-                all: data.len() as u64,
-                shadows: ShadowCounts::of(&own.view.levels[finest], own.map, &keep, side_m, step_m),
-            };
-            placed.push(place_view(own, level, &keep, &blank, jump_m, &frame)?);
             progress.step();
         }
         // Images and height maps are the most of a run's memory. Of a view that is placed, the
         // others need its heights only, and the grid what its image shows.
         if is_matched(sweep, index) {
-            pixels.push(ViewPixels::of(&views[index], finest));
+            pixels.push(ViewPixels::of(&lattices[0].views[index], finest));
         }
-        views[index].keep_level(usize::MAX);
-        maps[index].keep_heights();
+        for LatticeHeights { views, maps } in &mut lattices {
+            views[index].keep_level(usize::MAX);
+            maps[index].keep_heights();
+        }
     }
-    drop(maps);
-    drop(views);
+    drop(lattices);
     let (rasters, counts) = fuse(input, placed, &blind, &pixels, origin_m)?;
     progress.step();
     Ok((rasters, SurfaceCounts { views: kept, ..counts }))
@@ -224,6 +225,16 @@ fn fuse(
     let rasters = ChunkRasters::new(fused, &source, origin_m).cropped(core);
     let counts = SurfaceCounts { speckle_removed, ..SurfaceCounts::of(&rasters) };
     Ok((rasters, counts))
+}
+
+/// Marks the pixels that show no height: blank ones, and those whose best height lies outside the
+/// range that was asked for.
+fn shows_nothing(map: &HeightMap, blank: &Grid<bool>, config: &DsmConfig) -> Grid<bool> {
+    let mut out = blank.clone();
+    if let Some(asked) = config.height_range_m {
+        out.data_mut().iter_mut().zip(map.height_m.data()).for_each(|(m, h)| *m |= is_outside(map, *h, asked));
+    }
+    out
 }
 
 /// Returns the views that have heights of their own.

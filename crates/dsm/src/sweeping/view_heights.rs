@@ -80,6 +80,7 @@ pub fn sweep_views(
         sources,
         reach: tuning.reaches(),
         jump_at_edge: tuning.jump_at_edge,
+        lattices_px: &[],
         priors: Vec::new(),
     };
     progress.begin("sweeping heights", views.len() * levels.count());

@@ -20,13 +20,18 @@ pub struct FusionConfig {
     /// Height that those of the views count from, metres above the ellipsoid.
     pub origin_m: f64,
     /// Side of the tiles that are fused at a time, cells, rounded up to whole blocks of
-    /// [`BLOCK`]. It affects memory and parallelism only, never the result.
+    /// [`BLOCK`]. Tiles of many surfaces are smaller. It affects memory and parallelism only, never
+    /// the result.
     pub tile: usize,
 }
 
 /// Side of the blocks of cells that are regularised together. They lie on a fixed lattice of the
 /// grid, so that the result does not depend on tiles or threads.
 pub const BLOCK: usize = 256;
+/// Largest memory of the views' surfaces in a tile of several blocks, bytes.
+const SAMPLED_BYTES: usize = 48_000_000;
+/// Bytes of a view's surface in a cell: height, deviation and weight.
+const SAMPLE_BYTES: usize = 12;
 
 /// Surface fused from several views.
 #[derive(Debug, Clone)]
@@ -51,6 +56,7 @@ pub struct FusedSurface {
 /// A view's height in a cell.
 #[derive(Debug, Clone, Copy)]
 struct Sample {
+    view: usize,
     height_m: f32,
     sigma_m: f32,
     weight: f32,
@@ -67,7 +73,9 @@ struct Cell {
     seen: bool,
 }
 
-/// Fuses the views on a grid of `size` (columns, rows), tile by tile.
+/// Fuses the views on a grid of `size` (columns, rows), tile by tile. A view that was placed
+/// several times, from several lattices of pixels, counts once: its heights share its weight, and
+/// they tell as much as one of them. All that was placed of a view must follow each other.
 ///
 /// ```
 /// use sweep::fusion::{FusionConfig, fuse_views};
@@ -77,7 +85,10 @@ struct Cell {
 /// assert!(surface.height_m.data().iter().all(|h| h.is_nan()));
 /// ```
 pub fn fuse_views(views: &[PlacedView], size: (usize, usize), config: &FusionConfig) -> FusedSurface {
-    let windows = tiles(Window::whole(size.0, size.1), config.tile.max(1).next_multiple_of(BLOCK));
+    let fits = |side: &usize| (side + 2 * MARGIN).pow(2) * SAMPLE_BYTES * views.len() <= SAMPLED_BYTES;
+    let largest = config.tile.max(1).div_ceil(BLOCK);
+    let side = (1..=largest).map(|blocks| blocks * BLOCK).take_while(fits).last().unwrap_or(BLOCK);
+    let windows = tiles(Window::whole(size.0, size.1), side);
     let parts: Vec<Vec<(Window, FusedSurface)>> =
         windows.par_iter().map(|w| fuse_tile(views, size, *w, config)).collect();
     let mut out = FusedSurface::empty(size);
@@ -103,7 +114,11 @@ fn fuse_tile(
     let with_margin = |w: Window| w.grown(MARGIN).intersection(&whole).unwrap_or(w);
     let lattice = HeightLattice { step_m: config.step_m, origin_m: config.origin_m };
     let all = with_margin(tile);
-    let sampled: Vec<ViewSurface> = views.iter().map(|view| view.rasterise(all, config.tear_m)).collect();
+    let mut sampled: Vec<ViewSurface> = views.iter().map(|view| view.rasterise(all, config.tear_m)).collect();
+    for of_view in sampled.chunk_by_mut(|a, b| a.view == b.view) {
+        let share = 1.0 / of_view.len() as f32;
+        of_view.iter_mut().for_each(|s| s.weight.data_mut().iter_mut().for_each(|weight| *weight *= share));
+    }
     let fused = |block: Window| {
         let around = with_margin(block);
         let surfaces: Vec<ViewSurface> = sampled.iter().map(|surface| surface.part(inside(around, all))).collect();
@@ -140,6 +155,7 @@ fn fuse(surfaces: &[ViewSurface], chosen_m: &Grid<f32>, same_surface_m: f32) -> 
     for (i, chosen_m) in chosen_m.data().iter().enumerate() {
         samples.clear();
         let held = surfaces.iter().map(|s| Sample {
+            view: s.view,
             height_m: s.height_m.data()[i],
             sigma_m: s.sigma_m.data()[i],
             weight: s.weight.data()[i],
@@ -157,20 +173,27 @@ fn fuse(surfaces: &[ViewSurface], chosen_m: &Grid<f32>, same_surface_m: f32) -> 
     out
 }
 
-/// Fuses the samples that support the chosen height; `None` if there are none.
+/// Fuses the samples that support the chosen height; `None` if there are none. Those of one view
+/// follow each other.
 fn fuse_cell(samples: &mut Vec<Sample>, chosen_m: f32, same_surface_m: f32) -> Option<Cell> {
     let all: f32 = samples.iter().map(|s| s.weight).sum();
     samples.retain(|s| (s.height_m - chosen_m).abs() <= same_surface_m);
+    // The deviation is that of a weighted mean of the views, taken as independent. Several heights
+    // of one view are not: they tell as much as one of them.
+    let told = |s: &Sample| 1.0 / s.sigma_m.max(1e-3).powi(2);
+    let (mut views, mut information) = (0usize, 0.0f32);
+    for of_view in samples.chunk_by(|a, b| a.view == b.view) {
+        views += 1;
+        information += of_view.iter().map(told).sum::<f32>() / of_view.len() as f32;
+    }
     samples.sort_by(|a, b| a.height_m.total_cmp(&b.height_m));
     let (low, high) = middle_values(samples)?;
     let support: f32 = samples.iter().map(|s| s.weight).sum();
-    // The deviation is that of a weighted mean of the samples, taken as independent.
-    let information: f32 = samples.iter().map(|s| 1.0 / s.sigma_m.max(1e-3).powi(2)).sum();
     Some(Cell {
         height_m: chosen_m,
         single_m: 0.5 * (low.height_m + high.height_m),
         sigma_m: information.sqrt().recip(),
-        views: samples.len().min(255) as u8,
+        views: views.min(255) as u8,
         confidence: support / (all + 1.0),
         seen: support >= SEEN_WEIGHT,
     })
@@ -181,8 +204,17 @@ mod tests {
     use super::*;
 
     fn cell(samples: &[(f32, f32)], chosen_m: f32) -> Option<Cell> {
-        let sample = |&(height_m, weight): &(f32, f32)| Sample { height_m, sigma_m: 0.1, weight };
-        fuse_cell(&mut samples.iter().map(sample).collect(), chosen_m, 1.0)
+        let sample =
+            |(view, &(height_m, weight)): (usize, &(f32, f32))| Sample { view, height_m, sigma_m: 0.1, weight };
+        fuse_cell(&mut samples.iter().enumerate().map(sample).collect(), chosen_m, 1.0)
+    }
+
+    #[test]
+    fn the_heights_of_one_view_tell_as_much_as_one_of_them() {
+        let of_two_views = [0, 0, 0, 1, 1].map(|view| Sample { view, height_m: 10.0, sigma_m: 0.1, weight: 0.4 });
+        let c = fuse_cell(&mut of_two_views.to_vec(), 10.0, 1.0).unwrap();
+        assert_eq!(c.views, 2);
+        assert!((c.sigma_m - 0.1 / 2f32.sqrt()).abs() < 1e-6, "{}", c.sigma_m);
     }
 
     #[test]

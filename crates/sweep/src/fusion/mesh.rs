@@ -23,6 +23,8 @@ pub struct GridFrame<'a> {
 /// Surface of one view, sampled on the grid.
 #[derive(Debug, Clone)]
 pub struct ViewSurface {
+    /// Index of the view.
+    pub(super) view: usize,
     /// Grid column and row of the first cell.
     origin: [f32; 2],
     /// Height above the origin of the view's height map, metres; NaN where the view has none.
@@ -71,6 +73,8 @@ const NO_VERTEX: Vertex = Vertex { x: 0.0, y: 0.0, h: f32::NAN, sigma: f32::NAN,
 /// Kept pixels of one view in grid coordinates.
 #[derive(Debug, Clone)]
 pub struct PlacedView {
+    /// Index of the view.
+    pub(super) view: usize,
     vertices: Grid<Vertex>,
     /// Windows of the image, each with the box of grid cells that its facets reach: x0, y0, x1, y1.
     extents: Vec<(Window, [f32; 4])>,
@@ -101,7 +105,7 @@ pub fn place_view(
     }
     let windows = tiles(Window::whole(vertices.width(), vertices.height()), TILE);
     let extents = windows.into_iter().filter_map(|w| Some((w, extent(&vertices, w)?))).collect();
-    Ok(PlacedView { vertices, extents })
+    Ok(PlacedView { view: heights.index, vertices, extents })
 }
 
 /// Marks the cells of the grid that the given pixels of a view fall into at their heights.
@@ -159,7 +163,7 @@ impl PlacedView {
     /// metres are left out. A cell whose centre no facet covers has the highest of the kept pixels
     /// inside it. Cells without either, at walls and beside what the view does not see, stay void.
     pub fn rasterise(&self, cells: Window, tear: f32) -> ViewSurface {
-        let (mut facets, mut points) = (ViewSurface::empty(cells), ViewSurface::empty(cells));
+        let (mut facets, mut points) = (ViewSurface::empty(self.view, cells), ViewSurface::empty(self.view, cells));
         let (x1, y1) = ((cells.x + cells.width as i64) as f32, (cells.y + cells.height as i64) as f32);
         for (w, e) in &self.extents {
             if e[0] < x1 && e[1] < y1 && e[2] >= cells.x as f32 && e[3] >= cells.y as f32 {
@@ -269,6 +273,7 @@ impl ViewSurface {
     /// Returns the surface on a part of its cells, whose window counts from its first cell.
     pub(super) fn part(&self, cells: Window) -> Self {
         Self {
+            view: self.view,
             origin: [self.origin[0] + cells.x as f32, self.origin[1] + cells.y as f32],
             height_m: self.height_m.window(cells, f32::NAN),
             sigma_m: self.sigma_m.window(cells, f32::NAN),
@@ -276,8 +281,9 @@ impl ViewSurface {
         }
     }
 
-    pub(super) fn empty(cells: Window) -> Self {
+    pub(super) fn empty(view: usize, cells: Window) -> Self {
         Self {
+            view,
             origin: [cells.x as f32, cells.y as f32],
             height_m: Grid::filled(cells.width, cells.height, f32::NAN),
             sigma_m: Grid::filled(cells.width, cells.height, f32::NAN),
@@ -351,6 +357,7 @@ impl ViewSurface {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fusion::{FusionConfig, fuse_views};
     use crate::height_map::HeightMap;
     use crate::testing::camera::leaning_camera;
     use crate::testing::plane::view_of_plane;
@@ -358,9 +365,8 @@ mod tests {
     const SIZE: usize = 80;
     const METRES_PER_DEGREE: f64 = 111_320.0;
 
-    /// Surface of a view, with waves of 3 m, on a map with the coordinates `false_origin` at (0°,
-    /// 0°).
-    fn surface(false_origin: [f64; 2]) -> ViewSurface {
+    /// A view of waves of 3 m, on a map with the coordinates `false_origin` at (0°, 0°).
+    fn placed(false_origin: [f64; 2]) -> PlacedView {
         let view = view_of_plane(leaning_camera(SIZE, [0.3, -0.2]), SIZE, 0.0);
         let mut map = HeightMap::empty(SIZE, SIZE, 40.0);
         for (i, h) in map.height_m.data_mut().iter_mut().enumerate() {
@@ -375,7 +381,25 @@ mod tests {
         let frame = GridFrame { geotransform, map_from_ground: &to_map };
         let keep = Grid::filled(SIZE, SIZE, true);
         let blank = Grid::filled(SIZE, SIZE, false);
-        place_view(heights, 0, &keep, &blank, 5.0, &frame).unwrap().rasterise(Window::whole(80, 80), 5.0)
+        place_view(heights, 0, &keep, &blank, 5.0, &frame).unwrap()
+    }
+
+    fn surface(false_origin: [f64; 2]) -> ViewSurface {
+        placed(false_origin).rasterise(Window::whole(80, 80), 5.0)
+    }
+
+    #[test]
+    fn a_view_that_is_placed_twice_counts_once() {
+        let config = FusionConfig { same_surface_m: 1.0, tear_m: 5.0, step_m: 0.5, origin_m: 40.0, tile: 256 };
+        let view = placed([0.0; 2]);
+        let once = fuse_views(std::slice::from_ref(&view), (80, 80), &config);
+        let twice = fuse_views(&[view.clone(), view], (80, 80), &config);
+        let bits = |grid: &Grid<f32>| grid.data().iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+        assert_eq!(bits(&twice.height_m), bits(&once.height_m));
+        assert_eq!(bits(&twice.sigma_m), bits(&once.sigma_m));
+        assert_eq!(bits(&twice.confidence), bits(&once.confidence));
+        assert_eq!(twice.views, once.views);
+        assert!(once.views.data().iter().filter(|n| **n == 1).count() > 3000);
     }
 
     /// At 5,000 km the resolution of an f32 is half a metre: no absolute coordinate may pass

@@ -202,8 +202,8 @@ mod tests {
     const LATTICE: HeightLattice = HeightLattice { step_m: 0.5, origin_m: 100.2 };
 
     fn views(count: u32, height_m: impl Fn(u32, usize, usize) -> f32) -> Vec<ViewSurface> {
-        let view = |view| {
-            let mut surface = ViewSurface::empty(Window::whole(SIZE, SIZE));
+        let view = |view: u32| {
+            let mut surface = ViewSurface::empty(view as usize, Window::whole(SIZE, SIZE));
             for (x, y) in (0..SIZE).flat_map(|y| (0..SIZE).map(move |x| (x, y))) {
                 surface.height_m[(x, y)] = height_m(view, x, y);
                 surface.sigma_m[(x, y)] = 0.2;
