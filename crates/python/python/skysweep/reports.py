@@ -4389,6 +4389,9 @@ class SweepTuning(Report):
     """The same for lower heights, which begin farther away where streets are narrow, coarse
     pixels."""
 
+    lattices: int
+    """Number of lattices of pixels on which the finest level is swept, at most four."""
+
     jump_at_edge: int
     """Penalty of a height jump across the strongest image edges on the finest level, of 112 for
     the worst cost."""
