@@ -28,7 +28,8 @@ pub struct FusionConfig {
 /// Side of the blocks of cells that are regularised together. They lie on a fixed lattice of the
 /// grid, so that the result does not depend on tiles or threads.
 pub const BLOCK: usize = 256;
-/// Largest memory of the views' surfaces in a tile of several blocks, bytes.
+/// Largest memory of the views' surfaces in a tile of several blocks, bytes: three surfaces in a
+/// tile of 1024 × 1024 cells.
 const SAMPLED_BYTES: usize = 48_000_000;
 /// Bytes of a view's surface in a cell: height, deviation and weight.
 const SAMPLE_BYTES: usize = 12;
