@@ -127,16 +127,8 @@ fn sweep_chunk(
             views
         }
     };
-    let mut sweep = SceneSweep {
-        range: work.height_range,
-        step_m: plan.step_m,
-        levels: work.levels,
-        sources: work.sources.clone(),
-        reach: plan.tuning.reaches(),
-        jump_at_edge: plan.tuning.jump_at_edge,
-        lattices_px: plan.tuning.lattices_px(),
-        priors: Vec::new(),
-    };
+    let mut sweep = SceneSweep::new(work.height_range, plan.step_m, work.levels, work.sources.clone(), &plan.tuning);
+    sweep.lattices_px = plan.tuning.lattices_px();
     let mut ids: &[String] = &[];
     if let Some(path) = &plan.config.prior {
         let prior = session.prior(path)?;

@@ -316,16 +316,7 @@ impl ChunkPlanner<'_> {
         let views = read_chunk_views(self.images, self.characters, windows, |image, window| {
             read_coarse_view(image, window, level)
         })?;
-        let sweep = SceneSweep {
-            range: wide,
-            step_m: self.step_m,
-            levels: SweepLevels::only(level),
-            sources,
-            reach: self.tuning.reaches(),
-            jump_at_edge: self.tuning.jump_at_edge,
-            lattices_px: &[],
-            priors: Vec::new(),
-        };
+        let sweep = SceneSweep::new(wide, self.step_m, SweepLevels::only(level), sources, self.tuning);
         let found = probe::seen_range(&views, &sweep, self.range, &Muted(self.progress))?;
         let Some(found) = found else { return Ok(self.range) };
         let margin = MARGIN_M.max(0.1 * found.range.span_m());

@@ -240,16 +240,7 @@ impl PlannedScene<'_> {
                 read_chunk_views(images, &self.pointed.characters, &windows, read_view)?
             }
         };
-        let sweep = SceneSweep {
-            range,
-            step_m: self.step_m,
-            levels: SweepLevels::only(0),
-            sources: self.sources.to_vec(),
-            reach: self.tuning.reaches(),
-            jump_at_edge: self.tuning.jump_at_edge,
-            lattices_px: &[],
-            priors: Vec::new(),
-        };
+        let sweep = SceneSweep::new(range, self.step_m, SweepLevels::only(0), self.sources.to_vec(), self.tuning);
         let found = probe::extended_range(&views, &sweep, self.pixel_m, sides, &Muted(session.progress));
         session.views = Some(views);
         let Some(found) = found? else { return Ok(range) };

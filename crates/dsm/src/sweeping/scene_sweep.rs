@@ -24,6 +24,7 @@ use crate::prior::prior_findings::PriorFindings;
 use crate::prior::prior_verdict::refuted;
 use crate::prior::prior_view::{DEVIATION_M, ViewPrior, tolerance_m};
 use crate::session::Muted;
+use crate::tuning::SweepTuning;
 use crate::values::HeightRange;
 
 /// Tolerance of the consistency check on coarse levels, pixels. Coarse heights are rough, and a
@@ -59,6 +60,18 @@ pub(crate) struct SceneSweep {
 }
 
 impl SceneSweep {
+    /// Returns the sweep of the images' own lattices, without a city model.
+    pub(crate) fn new(
+        range: HeightRange,
+        step_m: f64,
+        levels: SweepLevels,
+        sources: Vec<Vec<usize>>,
+        tuning: &SweepTuning,
+    ) -> Self {
+        let (reach, jump_at_edge) = (tuning.reaches(), tuning.jump_at_edge);
+        Self { range, step_m, levels, sources, reach, jump_at_edge, lattices_px: &[], priors: Vec::new() }
+    }
+
     /// Returns the distance of two hypotheses of a level, metres.
     pub(crate) fn step_at(&self, level: usize) -> f64 {
         self.step_m * f64::from(1u32 << level)

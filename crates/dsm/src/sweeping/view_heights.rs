@@ -73,16 +73,7 @@ pub fn sweep_views(
         images.iter().map(|image| Window::whole(image.pixels.width(), image.pixels.height())).collect();
     let levels = choose_levels(range, step_m, &smallest_sides(&windows), &tuning);
     let views: Vec<SweepView> = images.into_iter().map(|i| SweepView::new(i.camera, i.pixels)).collect();
-    let sweep = SceneSweep {
-        range,
-        step_m,
-        levels,
-        sources,
-        reach: tuning.reaches(),
-        jump_at_edge: tuning.jump_at_edge,
-        lattices_px: &[],
-        priors: Vec::new(),
-    };
+    let sweep = SceneSweep::new(range, step_m, levels, sources, &tuning);
     progress.begin("sweeping heights", views.len() * levels.count());
     let maps = sweep_scene(&views, &sweep, progress)?.maps;
     confirmed(&views, sweep.sources, maps, levels)
