@@ -21,11 +21,6 @@ pub struct ChangeConfig {
     /// Distance by which the walls of both surfaces reach too far outwards, metres. It is taken off
     /// the volumes of regions.
     pub overreach_m: f64,
-    /// Growth of that distance per metre of a wall's height above `low_wall_m`: high walls hide
-    /// more beside them.
-    pub overreach_growth: f64,
-    /// Height of the walls up to which the distance does not grow, metres.
-    pub low_wall_m: f64,
     /// Standard deviation of that distance for one region, metres.
     pub overreach_sigma_m: f64,
 }
@@ -38,22 +33,12 @@ impl Default for ChangeConfig {
             least_area_m2: 30.0,
             position_m: 1.5,
             overreach_m: 0.0,
-            overreach_growth: 0.0,
-            low_wall_m: 0.0,
             overreach_sigma_m: 0.1,
         }
     }
 }
 
 impl ChangeConfig {
-    /// Distance by which walls of a height reach too far outwards, metres. It grows at most to the
-    /// tolerance of position: beyond it the change would have been explained by a moved wall, and a
-    /// spike of a hundred metres is no wall.
-    pub(crate) fn overreach_of_m(&self, wall_m: f64) -> f64 {
-        let growth = self.overreach_growth * (wall_m - self.low_wall_m).max(0.0);
-        self.overreach_m + growth.min(self.position_m)
-    }
-
     /// Checks the ranges of the parameters.
     ///
     /// # Errors
@@ -68,23 +53,6 @@ impl ChangeConfig {
         within("the least area", self.least_area_m2, 0.0, 1e6, "0 to 1000000 m²")?;
         within("the tolerance of position", self.position_m, 0.0, 20.0, "0 to 20 m")?;
         within("the overreach of walls", self.overreach_m, -10.0, 10.0, "-10 to 10 m")?;
-        within("the growth of the overreach", self.overreach_growth, -1.0, 1.0, "-1 to 1")?;
-        within("the height of low walls", self.low_wall_m, 0.0, 1000.0, "0 to 1000 m")?;
         within("the deviation of the overreach", self.overreach_sigma_m, 0.0, 10.0, "0 to 10 m")
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_overreach_grows_above_low_walls_only() {
-        let config = ChangeConfig { overreach_m: 0.1, overreach_growth: 0.03, low_wall_m: 5.0, ..Default::default() };
-        assert_eq!(config.overreach_of_m(4.0), 0.1);
-        assert!((config.overreach_of_m(15.0) - 0.4).abs() < 1e-12);
-        assert!((config.overreach_of_m(130.0) - 1.6).abs() < 1e-12, "a spike is no wall");
-        let wrong = ChangeConfig { overreach_growth: f64::NAN, ..config };
-        assert!(matches!(wrong.validate(), Err(ChangeError(Reason::Parameter { .. }))));
     }
 }

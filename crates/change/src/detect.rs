@@ -24,7 +24,8 @@ const FILLED_SHARE: f32 = 0.5;
 /// Least probability that both heights of a cell are right from which the cell decides: it is
 /// rather right than wrong.
 const RATHER_RIGHT: f32 = 0.5;
-/// Least share of a region's cells that must decide. The others follow them.
+/// Least share of a region that must be observed on both dates, and least share of what is observed
+/// that must decide. The other cells follow them.
 const MOSTLY: f64 = 0.5;
 /// Smallest standard deviation of a difference, metres: what f32 keeps of heights on mountains.
 const SIGMA_MIN_M: f32 = 0.001;
@@ -242,7 +243,9 @@ fn take_region(
     let all: Vec<usize> = cells.into_iter().chain(gained).collect();
     let counted = |counts: &dyn Fn(usize) -> bool| all.iter().filter(|at| counts(**at)).count() as f64 * cell_area_m2;
     let (all_m2, decided_m2) = (all.len() as f64 * cell_area_m2, counted(&decides));
-    if decided_m2 < MOSTLY * all_m2 {
+    let filled_m2 = counted(&|at| !is_observed(input, at));
+    let observed_m2 = all_m2 - filled_m2;
+    if observed_m2 < MOSTLY * all_m2 || decided_m2 < MOSTLY * observed_m2 {
         all.iter().for_each(|at| change.numbers.data_mut()[*at] = NONE);
         return None;
     }
@@ -254,10 +257,9 @@ fn take_region(
     let step_m = sum(&core, &difference) / core.len().max(1) as f64;
     let raw_m3 = sum(&all, &difference) * cell_area_m2;
     // A wall that lies inwards cannot turn a gain into a loss.
-    let overreach_m3 = (config.overreach_of_m(step_m.abs()) * border_m * step_m / raw_m3).min(0.9) * raw_m3;
+    let overreach_m3 = (config.overreach_m * border_m * step_m / raw_m3).min(0.9) * raw_m3;
     let wall_sigma_m3 = config.overreach_sigma_m * border_m * step_m.abs();
     let noise_m3 = change.mean_sigma_m(all.len(), variance_m2(&all)) * all_m2;
-    let filled_m2 = counted(&|at| !is_observed(input, at));
     change.regions.push(ChangeRegion {
         cells: all,
         area_m2: all_m2,

@@ -12,7 +12,7 @@
 //!    et al. (2022, <https://doi.org/10.1109/JSTARS.2022.3188922>).
 //! 4. **Regions** of cells beyond the level of detection with one sign. Heights that the other
 //!    surface has within the tolerance of position do not count as changed, so that walls do not.
-//!    Most cells of a region must decide.
+//!    Most of a region must be observed on both dates, and most of that must decide.
 //! 5. A **test** of each region's mean. The probability is multiplied by the number of connected
 //!    shapes of its size that the scene holds (Bonferroni), so that all regions together contain an
 //!    invented one with a probability of at most 1 − confidence.

@@ -158,13 +158,6 @@ class ChangeConfig(TypedDict, total=False):
     """Distance by which the walls of both surfaces reach too far outwards, metres. It is taken
     off the volumes of regions."""
 
-    overreach_growth: float
-    """Growth of that distance per metre of a wall's height above `low_wall_m`: high walls hide
-    more beside them."""
-
-    low_wall_m: float
-    """Height of the walls up to which the distance does not grow, metres."""
-
     overreach_sigma_m: float
     """Standard deviation of that distance for one region, metres."""
 
