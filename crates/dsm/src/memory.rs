@@ -16,8 +16,8 @@ const DEFAULT_MB: u64 = 4000;
 /// bytes.
 const BASE: u64 = 200_000_000;
 /// Bytes per pixel of all views while they are swept: the image with its pyramid (16/3), the
-/// heights of two levels with deviation, confidence and support (16 + 4).
-const SWEPT_BYTES_PER_PIXEL: u64 = 26;
+/// heights of all levels with deviation, confidence and support (64/3).
+const SWEPT_BYTES_PER_PIXEL: u64 = 27;
 /// The same for each further lattice of pixels: its image (4) and heights (16).
 const SWEPT_BYTES_PER_LATTICE: u64 = 20;
 /// Bytes per pixel of a view in work: the ranges of hypotheses and steep surfaces (10) with their

@@ -4,7 +4,7 @@
 //! The stages are
 //!
 //! 1. [`pointing`]: tie points between the views, and one image-space correction per view;
-//! 2. [`ranges`] and [`Prior`]: the height hypotheses of each pixel;
+//! 2. [`ranges`], [`Prior`] and [`CoarseGuide`]: the height hypotheses of each pixel;
 //! 3. [`cost`]: how little the views agree, per pixel and hypothesis;
 //! 4. [`aggregation`]: semi-global sums of the costs along eight directions;
 //! 5. [`sweep_level`]: all of that for one view on one pyramid level, read out as a [`HeightMap`]
@@ -24,6 +24,7 @@ pub mod consistency;
 pub mod cost;
 pub mod fusion;
 
+mod coarse_guide;
 mod error;
 mod geometry;
 mod height_map;
@@ -42,6 +43,7 @@ mod view;
 mod volume;
 mod window_sums;
 
+pub use coarse_guide::CoarseGuide;
 pub use error::SweepError;
 pub use geometry::source_from_reference;
 pub use height_map::HeightMap;

@@ -165,6 +165,18 @@ impl Ranges {
         self
     }
 
+    /// Narrows the search of a pixel to the heights from `lo_m` to `hi_m`, metres above the
+    /// ellipsoid. A pixel that searches none of them keeps its range.
+    pub fn narrow(&mut self, at: (usize, usize), (lo_m, hi_m): (f64, f64)) {
+        let (low, count) = span(lo_m, hi_m, self.step_m);
+        let end = |low: i32, count: u16| low + i32::from(count);
+        let first = low.max(self.low[at]);
+        let number = end(low, count).min(end(self.low[at], self.count[at])) - first;
+        if let Some(number) = u16::try_from(number).ok().filter(|number| *number > 0) {
+            (self.low[at], self.count[at]) = (first, number);
+        }
+    }
+
     /// Returns the number of hypotheses of all pixels.
     pub fn evaluations(&self) -> u64 {
         self.count.data().iter().map(|&n| u64::from(n)).sum()

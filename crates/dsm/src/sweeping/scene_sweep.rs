@@ -8,7 +8,7 @@
 //! another, and edges fall between other pixels. The finest level may therefore be swept on several
 //! lattices, each the same image resampled, whose heights are fused (the idea of cycle spinning:
 //! Coifman and Donoho 1995, "Translation-invariant de-noising"). The other images of a cost stay as
-//! they are.
+//! they are. The other lattices ask the coarse levels where a pattern repeats ([`CoarseGuide`]).
 
 use std::collections::BTreeMap;
 
@@ -16,7 +16,7 @@ use numeric::Progress;
 use rayon::prelude::*;
 use sweep::consistency::{ConsistencyConfig, Heights, count_agreeing};
 use sweep::ranges::{Ranges, Reach};
-use sweep::{HeightMap, LevelConfig, Prior, Reference, SweepError, SweepView, ViewLevel, sweep_level};
+use sweep::{CoarseGuide, HeightMap, LevelConfig, Prior, Reference, SweepError, SweepView, ViewLevel, sweep_level};
 
 use crate::error::DsmError;
 use crate::planning::levels::SweepLevels;
@@ -119,27 +119,49 @@ pub(crate) fn sweep_scene(
     let none = PlacedModel { priors: vec![None; views.len()], findings: PriorFindings::default(), hypotheses: 0 };
     let model = if sweep.priors.iter().any(Option::is_some) {
         let level = (finest + 1).min(coarsest);
-        let alone = sweep_down(views, sweep, level, &none.priors, &Muted(progress))?;
+        let levels = SweepLevels { finest: level, coarsest };
+        let alone = sweep_down(views, sweep, levels, &none.priors, &Muted(progress))?;
         place_model(sweep, &alone, level)
     } else {
         none
     };
-    let coarse = sweep_down(views, sweep, finest + 1, &model.priors, progress)?;
+    let above = SweepLevels { finest: finest + 1, coarsest };
+    let coarse = sweep_down(views, sweep, above, &model.priors, progress)?;
     let mut hypotheses = model.hypotheses + coarse.hypotheses;
     let mut finest_on = |lattice: Lattice<'_>| {
         progress.check_cancelled()?;
-        let swept = sweep_views(views, sweep, lattice, (finest, &coarse.maps), &model.priors, progress)?;
-        hypotheses += swept.hypotheses;
-        Ok::<_, DsmError>(swept.maps)
+        let (maps, evaluated) = sweep_views(views, sweep, lattice, (finest, coarse.last()), &model.priors, progress)?;
+        hypotheses += evaluated;
+        Ok::<_, DsmError>(maps)
     };
-    let maps = finest_on(Lattice { references: views, offset_px: [0.0; 2] })?;
+    let maps = finest_on(Lattice { references: views, offset_px: [0.0; 2], guides: &[] })?;
+    let deeper = match deepest_guide(views, finest) {
+        deepest if !sweep.lattices_px.is_empty() && deepest > coarsest => {
+            let levels = SweepLevels { finest: finest + 1, coarsest: deepest };
+            Some(sweep_down(views, sweep, levels, &model.priors, &Muted(progress))?)
+        }
+        _ => None,
+    };
+    let coarser = &deeper.as_ref().unwrap_or(&coarse).levels;
+    let of_view = |view: usize| coarser.iter().rev().map(|maps| &maps[view]).collect();
+    let guides: Vec<CoarseGuide<'_>> =
+        maps.iter().enumerate().map(|(view, own)| CoarseGuide { own, coarser: of_view(view) }).collect();
     let mut shifted = Vec::with_capacity(sweep.lattices_px.len());
     for &offset_px in sweep.lattices_px {
         let references: Vec<SweepView> = views.par_iter().map(|view| view.on_lattice(finest, offset_px)).collect();
-        let maps = finest_on(Lattice { references: &references, offset_px })?;
+        let maps = finest_on(Lattice { references: &references, offset_px, guides: &guides })?;
         shifted.push(LatticeHeights { views: references, maps });
     }
+    hypotheses += deeper.map_or(0, |deeper| deeper.hypotheses);
     Ok(SceneHeights { maps, shifted, hypotheses, findings: model.findings })
+}
+
+/// Returns the coarsest level that guides the finest one: at most [`CoarseGuide::LEVELS`] above it, and
+/// one that all views have.
+fn deepest_guide(views: &[SweepView], finest: usize) -> usize {
+    let present = |view: &&SweepView| !view.levels[finest].data().is_empty();
+    let levels = views.iter().filter(present).map(|view| view.levels.len() - 1).min();
+    levels.unwrap_or(finest).min(finest + CoarseGuide::LEVELS)
 }
 
 /// A lattice of pixels.
@@ -149,39 +171,50 @@ struct Lattice<'a> {
     references: &'a [SweepView],
     /// Place of its pixels against those of the images, pixels of the level.
     offset_px: [f64; 2],
+    /// What is known of each view before it is swept on this lattice; empty if nothing is.
+    guides: &'a [CoarseGuide<'a>],
 }
 
 /// Heights of all views after several levels.
 struct SweptLevels {
-    maps: Vec<HeightMap>,
+    /// One map per view and level, the coarsest level first.
+    levels: Vec<Vec<HeightMap>>,
     /// Number of pixel-hypothesis pairs evaluated.
     hypotheses: u64,
 }
 
-/// Sweeps all views from the coarsest level down to `last`. Heights of a coarse level that no
-/// source shares are dropped.
+impl SweptLevels {
+    /// Returns the maps of the finest of the levels; none before any was swept.
+    fn last(&self) -> &[HeightMap] {
+        self.levels.last().map_or(&[], Vec::as_slice)
+    }
+}
+
+/// Sweeps all views from the coarsest of the levels down to the finest. Heights of a coarse level
+/// that no source shares are dropped.
 fn sweep_down(
     views: &[SweepView],
     sweep: &SceneSweep,
-    last: usize,
+    levels: SweepLevels,
     priors: &[Option<ViewPrior>],
     progress: &dyn Progress,
 ) -> Result<SweptLevels, DsmError> {
-    let mut out = SweptLevels { maps: Vec::new(), hypotheses: 0 };
-    for level in (last..=sweep.levels.coarsest).rev() {
+    let mut out = SweptLevels { levels: Vec::new(), hypotheses: 0 };
+    for level in (levels.finest..=levels.coarsest).rev() {
         progress.check_cancelled()?;
-        let own = Lattice { references: views, offset_px: [0.0; 2] };
-        let swept = sweep_views(views, sweep, own, (level, &out.maps), priors, progress)?;
-        out = SweptLevels { maps: swept.maps, hypotheses: out.hypotheses + swept.hypotheses };
+        let own = Lattice { references: views, offset_px: [0.0; 2], guides: &[] };
+        let (mut maps, evaluated) = sweep_views(views, sweep, own, (level, out.last()), priors, progress)?;
         if level > sweep.levels.finest {
-            out.maps = drop_lone_heights(views, sweep, &out.maps, level as u32)?;
+            maps = drop_lone_heights(views, sweep, &maps, level as u32)?;
         }
+        out.levels.push(maps);
+        out.hypotheses += evaluated;
     }
     Ok(out)
 }
 
 /// Sweeps all views on one level and lattice, around the heights of the coarser level if there are
-/// any.
+/// any; returns their heights and the number of hypotheses.
 fn sweep_views(
     views: &[SweepView],
     sweep: &SceneSweep,
@@ -189,7 +222,7 @@ fn sweep_views(
     (level, coarser): (usize, &[HeightMap]),
     priors: &[Option<ViewPrior>],
     progress: &dyn Progress,
-) -> Result<SweptLevels, SweepError> {
+) -> Result<(Vec<HeightMap>, u64), SweepError> {
     let swept: Vec<(HeightMap, u64)> = (0..views.len())
         .into_par_iter()
         .map(|i| {
@@ -199,7 +232,7 @@ fn sweep_views(
         })
         .collect::<Result<_, SweepError>>()?;
     let hypotheses = swept.iter().map(|(_, n)| n).sum();
-    Ok(SweptLevels { maps: swept.into_iter().map(|(map, _)| map).collect(), hypotheses })
+    Ok((swept.into_iter().map(|(map, _)| map).collect(), hypotheses))
 }
 
 /// A city model at its place in the images, without the buildings that they refute.
@@ -214,7 +247,7 @@ struct PlacedModel {
 /// Places the model at the heights of a level that was swept without it.
 fn place_model(sweep: &SceneSweep, alone: &SweptLevels, level: usize) -> PlacedModel {
     let step_m = sweep.step_at(level);
-    let of_views = || sweep.priors.iter().zip(&alone.maps).filter_map(|(prior, map)| Some((prior.as_ref()?, map)));
+    let of_views = || sweep.priors.iter().zip(alone.last()).filter_map(|(prior, map)| Some((prior.as_ref()?, map)));
     let placed: Vec<Option<ViewPrior>> = of_views().map(|(prior, map)| prior.placed(map, level, step_m)).collect();
     let differences: Vec<Option<BTreeMap<u32, Vec<f32>>>> = of_views()
         .zip(&placed)
@@ -248,11 +281,14 @@ fn sweep_view(
     }
     let step = sweep.step_at(level);
     let range = (sweep.range.low_m, sweep.range.high_m);
-    let ranges = match coarser {
+    let mut ranges = match coarser {
         None => Ranges::uniform(w, h, step, range),
         Some(c) => Ranges::from_coarser(w, h, step, &c.height_m, c.origin_m, range, sweep.reach),
     }
     .without_voids(reference.image);
+    if let Some(guide) = lattice.guides.get(index) {
+        guide.narrow(&mut ranges);
+    }
     let prior_m = known.map(|prior| prior.at_level(level, (w, h), lattice.offset_px));
     let prior = prior_m.as_ref().map(|height_m| Prior { height_m, deviation_m: DEVIATION_M });
     let ranges = match prior {
