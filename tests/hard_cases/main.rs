@@ -19,7 +19,7 @@
 //!   heights; void where nobody sees, declared or not
 //! - repetitive texture (`radiometry::repeated_texture_…`, `simulated::sheds_that_repeat_…`): not a
 //!   period too high, with two views too
-//! - striped roof (`radiometry::a_striped_roof_…`): ≥ 90 % right with two views
+//! - striped roof (`radiometry::a_striped_roof_…`): ≥ 80 % right with two views
 //! - low texture (`simulated::a_town_under_a_veil_…`): ≥ 85 % of the ground, ≥ 75 % of the roofs
 //!   right
 //! - water (`radiometry::glittering_water_…`, `simulated::a_harbour_…`): void or level; land

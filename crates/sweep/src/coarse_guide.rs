@@ -13,8 +13,8 @@ use crate::height_map::HeightMap;
 use crate::ranges::Ranges;
 use crate::window_sums::window_sums;
 
-/// Distinctness below which a second height fits nearly as well as the best one.
-const DISTINCT: f32 = 0.5;
+/// Distinctness of a coarse height that is asked: no second height fits nearly as well.
+const DISTINCT: f32 = 0.75;
 /// Mean distinctness around a pixel below which a pattern repeats. Single pixels are ambiguous
 /// everywhere.
 const REPEATED: f64 = 0.15;
