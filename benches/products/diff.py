@@ -124,7 +124,7 @@ def main():
     within = lambda of: f"{int((of <= RIGHT_VOLUME).sum())} of {of.size}"
     lines = ["# Change between two dates of simulated towns", "",
              "Written by `benches/products/diff.py`. Each town gains three buildings and loses two between two acquisitions. The",
-             "volumes of all regions are held against the exact surfaces. The overreach of walls was measured on the seeds 11 to 15.",
+             "volumes of all regions are held against the exact surfaces. The overreach of walls was fitted to other towns.",
              "Vehicles are no part of the exact surfaces: a row of parked cars that came or went counts as invented.", "",
              f"- Volumes within {100 * RIGHT_VOLUME:.0f} %: {within(errors)}; of buildings of at least {LARGE_M2} m²: "
              f"{within(errors[large])}; of smaller ones: {within(errors[~large])}.",

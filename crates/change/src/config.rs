@@ -21,6 +21,8 @@ pub struct ChangeConfig {
     /// Distance by which the walls of both surfaces reach too far outwards, metres. It is taken off
     /// the volumes of regions.
     pub overreach_m: f64,
+    /// Growth of that distance per metre of a wall's height: high walls hide more beside them.
+    pub overreach_growth: f64,
     /// Standard deviation of that distance for one region, metres.
     pub overreach_sigma_m: f64,
 }
@@ -33,12 +35,20 @@ impl Default for ChangeConfig {
             least_area_m2: 30.0,
             position_m: 1.5,
             overreach_m: 0.0,
+            overreach_growth: 0.0,
             overreach_sigma_m: 0.1,
         }
     }
 }
 
 impl ChangeConfig {
+    /// Returns the distance by which walls of a height reach too far outwards, metres. It grows at
+    /// most to the tolerance of position: beyond it the change would have been explained by a moved
+    /// wall, and a spike of a hundred metres is no wall.
+    pub(crate) fn overreach_of_m(&self, wall_m: f64) -> f64 {
+        self.overreach_m + (self.overreach_growth * wall_m).min(self.position_m)
+    }
+
     /// Checks the ranges of the parameters.
     ///
     /// # Errors
@@ -53,6 +63,21 @@ impl ChangeConfig {
         within("the least area", self.least_area_m2, 0.0, 1e6, "0 to 1000000 m²")?;
         within("the tolerance of position", self.position_m, 0.0, 20.0, "0 to 20 m")?;
         within("the overreach of walls", self.overreach_m, -10.0, 10.0, "-10 to 10 m")?;
+        within("the growth of the overreach", self.overreach_growth, -1.0, 1.0, "-1 to 1")?;
         within("the deviation of the overreach", self.overreach_sigma_m, 0.0, 10.0, "0 to 10 m")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_overreach_grows_with_the_wall_but_not_with_a_spike() {
+        let config = ChangeConfig { overreach_m: 0.1, overreach_growth: 0.03, ..Default::default() };
+        assert!((config.overreach_of_m(10.0) - 0.4).abs() < 1e-12);
+        assert!((config.overreach_of_m(130.0) - 1.6).abs() < 1e-12);
+        let wrong = ChangeConfig { overreach_growth: f64::NAN, ..config };
+        assert!(matches!(wrong.validate(), Err(ChangeError(Reason::Parameter { .. }))));
     }
 }

@@ -257,7 +257,7 @@ fn take_region(
     let step_m = sum(&core, &difference) / core.len().max(1) as f64;
     let raw_m3 = sum(&all, &difference) * cell_area_m2;
     // A wall that lies inwards cannot turn a gain into a loss.
-    let overreach_m3 = (config.overreach_m * border_m * step_m / raw_m3).min(0.9) * raw_m3;
+    let overreach_m3 = (config.overreach_of_m(step_m.abs()) * border_m * step_m / raw_m3).min(0.9) * raw_m3;
     let wall_sigma_m3 = config.overreach_sigma_m * border_m * step_m.abs();
     let noise_m3 = change.mean_sigma_m(all.len(), variance_m2(&all)) * all_m2;
     change.regions.push(ChangeRegion {

@@ -48,7 +48,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "METRES", default_value_t = ChangeConfig::default().position_m)]
     position_m: f64,
     /// Distance by which walls reach too far outwards, in metres, taken off the volumes [default:
-    /// a seventh of a cell for surfaces of skysweep dsm, else 0].
+    /// 1 % of the wall's height for surfaces of skysweep dsm, else 0].
     #[arg(long, value_name = "METRES", allow_negative_numbers = true)]
     overreach_m: Option<f64>,
     /// Let filled cells count as observed.

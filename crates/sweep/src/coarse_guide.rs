@@ -115,7 +115,8 @@ mod tests {
     fn a_repeated_pattern_is_searched_where_the_finest_distinct_level_found_it() {
         let whole = (160, 101);
         let mut own = found(32, 3.0, 0.1);
-        // Level 1 is as ambiguous; level 2 saw the roof at 112 m but for one pixel, level 3 at 110 m.
+        // Level 1 is as ambiguous. Level 2 saw the roof at 112 m but for one pixel, level 3 at
+        // 110 m.
         let (first, mut second, third) = (found(16, 4.0, 0.2), found(8, 12.0, 0.9), found(4, 10.0, 0.9));
         second.height_m[(7, 7)] = f32::NAN;
         let coarser = [&first, &second, &third];

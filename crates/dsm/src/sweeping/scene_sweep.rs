@@ -156,8 +156,8 @@ pub(crate) fn sweep_scene(
     Ok(SceneHeights { maps, shifted, hypotheses, findings: model.findings })
 }
 
-/// Returns the coarsest level that guides the finest one: at most [`CoarseGuide::LEVELS`] above it, and
-/// one that all views have.
+/// Returns the coarsest level that guides the finest one: at most [`CoarseGuide::LEVELS`] above it,
+/// and one that all views have.
 fn deepest_guide(views: &[SweepView], finest: usize) -> usize {
     let present = |view: &&SweepView| !view.levels[finest].data().is_empty();
     let levels = views.iter().filter(present).map(|view| view.levels.len() - 1).min();

@@ -521,6 +521,9 @@ class ChangeConfig(Report):
     """Distance by which the walls of both surfaces reach too far outwards, metres. It is taken
     off the volumes of regions."""
 
+    overreach_growth: float
+    """Growth of that distance per metre of a wall's height: high walls hide more beside them."""
+
     overreach_sigma_m: float
     """Standard deviation of that distance for one region, metres."""
 
