@@ -35,10 +35,10 @@ const FILES: [&str; 9] = [CHANGE, SIGNIFICANCE, REGIONS, POLYGONS, AREAS, STYLES
 /// Range of the page's map of significance, standard deviations.
 const SHOWN_SIGMAS: f64 = 5.0;
 
-/// Growth of the distance by which the walls of surfaces of this toolkit reach too far outwards, per
-/// metre of their height. It was fitted to the volumes of buildings of 3 to 20 m that came or went:
-/// 99 in towns of `benches/evidence/change.py` (seeds 8051 to 8054 and 8061 to 8070), and 25 in
-/// those of `benches/products/diff.py` (seeds 11 to 15).
+/// Growth of the distance by which the walls of surfaces of this toolkit reach too far outwards,
+/// per metre of their height. It was fitted to the volumes of buildings of 3 to 20 m that came or
+/// went: 99 in towns of `benches/evidence/change.py` (seeds 8051 to 8054 and 8061 to 8070), and 25
+/// in those of `benches/products/diff.py` (seeds 11 to 15).
 const OVERREACH_GROWTH: f64 = 0.01;
 /// Standard deviation of that distance from building to building, cells, in the same towns.
 const OVERREACH_SIGMA_CELLS: f64 = 0.45;
