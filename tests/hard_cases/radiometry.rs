@@ -155,8 +155,8 @@ fn repeated_texture_is_not_taken_for_another_height() {
 }
 
 /// Two views of a hall of 12 m whose roof has stripes every 2.2 m. At 0.6 m of parallax per metre
-/// they match at heights 3.7 m apart. Without the coarse levels 64 % of it are right; other
-/// periods are still lost, whose aliases the coarse levels do not tell apart either.
+/// they match at heights 3.7 m apart. Without the coarse levels a good part of it lies at another
+/// of these heights. Roofs with some other periods still do.
 #[test]
 fn a_striped_roof_is_mostly_found_by_two_views() {
     let hall = |x: f64, y: f64| x.abs() < 16.0 && y.abs() < 12.0;

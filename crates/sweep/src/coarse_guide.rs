@@ -11,7 +11,7 @@ use raster::Grid;
 
 use crate::height_map::HeightMap;
 use crate::ranges::Ranges;
-use crate::window_sums::window_sums;
+use crate::window_sums::window_means;
 
 /// Distinctness of a coarse height that is asked: no second height fits nearly as well.
 const DISTINCT: f32 = 0.75;
@@ -66,12 +66,10 @@ impl CoarseGuide<'_> {
     /// tell apart.
     pub fn narrow(&self, ranges: &mut Ranges) {
         let distinctness = self.own.confidence.data();
-        let (width, height) = (self.own.height_m.width(), self.own.height_m.height());
-        let around = window_sums(distinctness.len(), width, REACH, |i| f64::from(distinctness[i]));
-        let within = |at: usize, end: usize| (at + REACH + 1).min(end) - at.saturating_sub(REACH);
-        for (i, sum) in around.into_iter().enumerate() {
+        let width = self.own.height_m.width();
+        let around = window_means(distinctness.len(), width, REACH, |i| f64::from(distinctness[i]));
+        for (i, mean) in around.into_iter().enumerate() {
             let at = (i % width, i / width);
-            let mean = sum / (within(at.0, width) * within(at.1, height)) as f64;
             let repeats = mean < REPEATED && self.own.support[at] >= SUPPORT_MIN;
             let Some((height_m, side)) = repeats.then(|| self.distinct_height_m(at)).flatten() else { continue };
             let reach_m = side as f64 * ranges.step_m;

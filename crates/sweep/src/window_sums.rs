@@ -1,4 +1,4 @@
-//! Sums over the square around every cell, by running sums.
+//! Sums and means over the square around every cell, by running sums.
 
 use std::iter::Sum;
 use std::ops::{AddAssign, SubAssign};
@@ -48,9 +48,25 @@ where
     out
 }
 
+/// Returns the means over the same squares, of the values inside the grid.
+pub(crate) fn window_means(count: usize, width: usize, reach: usize, value: impl Fn(usize) -> f64) -> Vec<f64> {
+    let sums = window_sums(count, width, reach, value);
+    let height = count.checked_div(width).unwrap_or(0);
+    let within = |at: usize, end: usize| (at + reach + 1).min(end) - at.saturating_sub(reach);
+    let mean = |(i, sum): (usize, f64)| sum / (within(i % width, width) * within(i / width, height)) as f64;
+    sums.into_iter().enumerate().map(mean).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn means_are_those_of_the_values_inside() {
+        let means = window_means(15, 5, 1, |i| i as f64);
+        assert_eq!((means[0], means[5 + 2], means[2 * 5 + 4]), (3.0, 7.0, 11.0));
+        assert!(window_means(0, 0, 7, |i| i as f64).is_empty());
+    }
 
     #[test]
     fn sums_are_those_of_the_window() {

@@ -135,13 +135,7 @@ pub(crate) fn sweep_scene(
         Ok::<_, DsmError>(maps)
     };
     let maps = finest_on(Lattice { references: views, offset_px: [0.0; 2], guides: &[] })?;
-    let deeper = match deepest_guide(views, finest) {
-        deepest if !sweep.lattices_px.is_empty() && deepest > coarsest => {
-            let levels = SweepLevels { finest: finest + 1, coarsest: deepest };
-            Some(sweep_down(views, sweep, levels, &model.priors, &Muted(progress))?)
-        }
-        _ => None,
-    };
+    let deeper = sweep_guides(views, sweep, &model.priors, progress)?;
     let coarser = &deeper.as_ref().unwrap_or(&coarse).levels;
     let of_view = |view: usize| coarser.iter().rev().map(|maps| &maps[view]).collect();
     let guides: Vec<CoarseGuide<'_>> =
@@ -156,12 +150,24 @@ pub(crate) fn sweep_scene(
     Ok(SceneHeights { maps, shifted, hypotheses, findings: model.findings })
 }
 
-/// Returns the coarsest level that guides the finest one: at most [`CoarseGuide::LEVELS`] above it,
-/// and one that all views have.
-fn deepest_guide(views: &[SweepView], finest: usize) -> usize {
-    let present = |view: &&SweepView| !view.levels[finest].data().is_empty();
-    let levels = views.iter().filter(present).map(|view| view.levels.len() - 1).min();
-    levels.unwrap_or(finest).min(finest + CoarseGuide::LEVELS)
+/// Sweeps the levels that guide the further lattices: at most [`CoarseGuide::LEVELS`] above the
+/// finest, and such that all views have. `None` where there are no further lattices, or the sweep
+/// begins that far up anyway.
+fn sweep_guides(
+    views: &[SweepView],
+    sweep: &SceneSweep,
+    priors: &[Option<ViewPrior>],
+    progress: &dyn Progress,
+) -> Result<Option<SweptLevels>, DsmError> {
+    let SweepLevels { finest, coarsest } = sweep.levels;
+    let is_present = |view: &&SweepView| !view.levels[finest].data().is_empty();
+    let shared = views.iter().filter(is_present).map(|view| view.levels.len() - 1).min().unwrap_or(finest);
+    let deepest = shared.min(finest + CoarseGuide::LEVELS);
+    if sweep.lattices_px.is_empty() || deepest <= coarsest {
+        return Ok(None);
+    }
+    let levels = SweepLevels { finest: finest + 1, coarsest: deepest };
+    sweep_down(views, sweep, levels, priors, &Muted(progress)).map(Some)
 }
 
 /// A lattice of pixels.

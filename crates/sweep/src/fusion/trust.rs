@@ -14,7 +14,7 @@
 
 use raster::Grid;
 
-use crate::window_sums::window_sums;
+use crate::window_sums::{window_means, window_sums};
 
 /// Share that is added to the agreement, so that it also ranks cells in unobserved surroundings.
 const UNOBSERVED: f64 = 0.1;
@@ -84,18 +84,15 @@ pub fn calibrate(
     is_observed: impl Fn(usize) -> bool,
     config: &TrustConfig,
 ) -> Grid<f32> {
-    let (width, height) = (height_m.width(), height_m.height());
     let heights = height_m.data();
-    let agreed = window_sums(heights.len(), width, config.reach_cells, |i| {
+    let agreed = window_means(heights.len(), height_m.width(), config.reach_cells, |i| {
         if heights[i].is_nan() { 0.0 } else { f64::from(agreement.data()[i]) }
     });
     let roughness_m = roughness(single_m);
     let in_steps = |value_m: f32| (f64::from(value_m) / config.step_m).max(RATIO_MIN).ln();
     let mut confidence = height_m.clone();
     for (i, confidence) in confidence.data_mut().iter_mut().enumerate().filter(|(_, h)| !h.is_nan()) {
-        let reach = config.reach_cells;
-        let cells = span(i % width, reach, width).len() * span(i / width, reach, height).len();
-        let share = (UNOBSERVED + agreed[i] / cells as f64) / (UNOBSERVED + 1.0);
+        let share = (UNOBSERVED + agreed[i]) / (UNOBSERVED + 1.0);
         let sigma = &mut sigma_m.data_mut()[i];
         let is_observed = is_observed(i);
         if is_observed {
@@ -123,13 +120,11 @@ pub fn calibrate(
 /// The average is low on water and on what changed between the dates, and high around a tree, whose
 /// own heights are as uncertain.
 pub fn surroundings(confidence: &Grid<f32>, reach_cells: usize) -> Grid<f32> {
-    let (width, height) = (confidence.width(), confidence.height());
     let values = confidence.data();
-    let sums =
-        window_sums(values.len(), width, reach_cells, |i| if values[i].is_nan() { 0.0 } else { f64::from(values[i]) });
-    let cells = |i: usize| span(i % width, reach_cells, width).len() * span(i / width, reach_cells, height).len();
+    let known = |i: usize| if values[i].is_nan() { 0.0 } else { f64::from(values[i]) };
+    let means = window_means(values.len(), confidence.width(), reach_cells, known);
     let mut out = confidence.clone();
-    out.data_mut().iter_mut().zip(sums).enumerate().for_each(|(i, (out, sum))| *out = (sum / cells(i) as f64) as f32);
+    out.data_mut().iter_mut().zip(means).for_each(|(out, mean)| *out = mean as f32);
     out
 }
 
@@ -148,11 +143,6 @@ fn roughness(height_m: &Grid<f32>) -> Grid<f32> {
         *out = (squares[i] / count[i] - mean * mean).max(0.0).sqrt() as f32;
     }
     out
-}
-
-/// Returns the part of `0..n` within `reach` of `i`.
-fn span(i: usize, reach: usize, n: usize) -> std::ops::Range<usize> {
-    i.saturating_sub(reach)..(i + reach + 1).min(n)
 }
 
 #[cfg(test)]
