@@ -15,7 +15,7 @@ command -v "$python" > /dev/null || fail "$python is not installed"
 
 venv=${CARGO_TARGET_DIR:-target}/python/venv
 stamp=$venv/made
-optional="distributed tqdm xarray shapely matplotlib rasterio rioxarray geopandas pyproj pyarrow"
+optional="pytest-xdist distributed tqdm xarray shapely matplotlib rasterio rioxarray geopandas pyproj pyarrow"
 wanted="numpy pytest mypy; $optional"
 if [ "$(cat "$stamp" 2> /dev/null)" != "$wanted" ]; then
   rm -rf "$venv"

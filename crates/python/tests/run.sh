@@ -21,4 +21,8 @@ said=$(crates/python/tests/environment.sh) || skip "$said"
 PYTHONPATH=$(crates/python/tests/site.sh)
 export PYTHONPATH PYTHONDONTWRITEBYTECODE=1
 export SKYSWEEP_COMMAND=${SKYSWEEP_COMMAND:-$(realpath "$target")/debug/skysweep}
-exec "$target/python/venv/bin/python" -m pytest -q -p no:cacheprovider crates/python/tests "$@"
+python=$target/python/venv/bin/python
+# Most tests wait for a process of their own, so two at a time take little more than half as long.
+workers=()
+"$python" -c 'import xdist' 2> /dev/null && workers=(-n auto --maxprocesses 4)
+exec "$python" -m pytest -q -p no:cacheprovider "${workers[@]}" crates/python/tests "$@"

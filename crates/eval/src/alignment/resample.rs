@@ -12,17 +12,19 @@ use raster::Grid;
 pub fn bilinear(grid: &Grid<f32>, column: f64, row: f64) -> Option<f64> {
     let (left, top) = (floor(column)?, floor(row)?);
     let (u, v) = (column - left as f64, row - top as f64);
-    let (nearest_right, nearest_low) = (u >= 0.5, v >= 0.5);
-    let corner = |right: bool, low: bool| finite(grid, left + i64::from(right), top + i64::from(low));
-    let nearest = corner(nearest_right, nearest_low)?;
+    let corners = corners(grid, left, top);
+    let nearest = corners[usize::from(u >= 0.5) + 2 * usize::from(v >= 0.5)];
+    if !nearest.is_finite() {
+        return None;
+    }
     if u == 0.0 && v == 0.0 {
         return Some(nearest);
     }
     let mut sum = 0.0;
     let mut weights = 0.0;
-    for (right, low) in [(false, false), (true, false), (false, true), (true, true)] {
-        let weight = if right { u } else { 1.0 - u } * if low { v } else { 1.0 - v };
-        if let Some(value) = corner(right, low) {
+    let corner_weights = [(1.0 - u) * (1.0 - v), u * (1.0 - v), (1.0 - u) * v, u * v];
+    for (value, weight) in corners.into_iter().zip(corner_weights) {
+        if value.is_finite() {
             // The sum is relative to the nearest cell, so that a constant surface is reproduced
             // exactly.
             sum += weight * (value - nearest);
@@ -30,6 +32,24 @@ pub fn bilinear(grid: &Grid<f32>, column: f64, row: f64) -> Option<f64> {
         }
     }
     Some(nearest + sum / weights)
+}
+
+/// Returns the cell at a column and a row, its right neighbour and the two below them. Cells
+/// outside the grid are NaN.
+fn corners(grid: &Grid<f32>, left: i64, top: i64) -> [f64; 4] {
+    let all_inside = || {
+        let (column, row) = (usize::try_from(left).ok()?, usize::try_from(top).ok()?);
+        let is_inside = column + 1 < grid.width() && row + 1 < grid.height();
+        is_inside.then(|| (&grid.row(row)[column..column + 2], &grid.row(row + 1)[column..column + 2]))
+    };
+    if let Some((upper, lower)) = all_inside() {
+        return [upper[0], upper[1], lower[0], lower[1]].map(f64::from);
+    }
+    let cell = |column: i64, row: i64| {
+        let cell = usize::try_from(column).ok().zip(usize::try_from(row).ok());
+        cell.and_then(|(column, row)| grid.get(column, row)).map_or(f64::NAN, |&height| f64::from(height))
+    };
+    [cell(left, top), cell(left + 1, top), cell(left, top + 1), cell(left + 1, top + 1)]
 }
 
 /// Returns the cell nearest to a fractional position, or `None` outside the grid. Halves go to the
@@ -44,11 +64,6 @@ pub fn nearest<T: Copy>(grid: &Grid<T>, column: f64, row: f64) -> Option<T> {
 fn floor(value: f64) -> Option<i64> {
     let towards_zero = value as i64;
     (value.abs() < 1e15).then(|| towards_zero - i64::from(value < towards_zero as f64))
-}
-
-fn finite(grid: &Grid<f32>, column: i64, row: i64) -> Option<f64> {
-    let value = *grid.get(usize::try_from(column).ok()?, usize::try_from(row).ok()?)?;
-    value.is_finite().then_some(f64::from(value))
 }
 
 #[cfg(test)]

@@ -26,6 +26,7 @@ use numeric::{upper_median, upper_nmad};
 use raster::Grid;
 use rayon::prelude::*;
 use serde::Serialize;
+use std::collections::HashSet;
 
 /// Lowest number of cells valid in both surfaces.
 const LEAST_CELLS: usize = 100;
@@ -252,21 +253,20 @@ impl Search<'_> {
     }
 
     /// Refines a shift by compass search: it moves to the best of eight neighbours while that
-    /// improves, then halves the step.
+    /// improves, then halves the step. A shift that was tried before cannot be better than the best.
     fn refined(&self, samples: &[Sample], start: Candidate) -> Candidate {
         let least = (LEAST_OVERLAP * start.n as f64) as usize;
+        let is_near = |c: f64, r: f64| (c - start.columns).abs().max((r - start.rows).abs()) <= MOST_REFINEMENT_CELLS;
+        // Whole cells and halved steps are exact, so equal shifts have equal bits.
+        let mut tried = HashSet::from([[start.columns, start.rows].map(f64::to_bits)]);
         let mut best = start;
         let mut step = 0.5;
         while step >= LAST_STEP_CELLS {
-            let around: Vec<Candidate> = COMPASS
-                .par_iter()
-                .map(|(c, r)| self.candidate(samples, best.columns + c * step, best.rows + r * step))
-                .collect();
-            let within = |c: &Candidate| {
-                let (columns, rows) = (c.columns - start.columns, c.rows - start.rows);
-                c.n >= least && columns.abs().max(rows.abs()) <= MOST_REFINEMENT_CELLS
-            };
-            let next = around.into_iter().filter(within).fold(best, better);
+            let around = COMPASS.map(|(c, r)| (best.columns + c * step, best.rows + r * step));
+            let fresh: Vec<(f64, f64)> =
+                around.into_iter().filter(|&(c, r)| is_near(c, r) && tried.insert([c, r].map(f64::to_bits))).collect();
+            let found: Vec<Candidate> = fresh.par_iter().map(|&(c, r)| self.candidate(samples, c, r)).collect();
+            let next = found.into_iter().filter(|c| c.n >= least).fold(best, better);
             if next.score < best.score { best = next } else { step /= 2.0 }
         }
         best
