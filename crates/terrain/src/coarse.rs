@@ -43,6 +43,38 @@ pub(crate) fn at_cell(coarse: &Grid<f32>, side: usize, column: usize, row: usize
     line(y) + fy * (line(y_next) - line(y))
 }
 
+/// Returns the weighted means of the known heights of `side` × `side` cells, and the means of the
+/// weights, in which unknown cells count as 0.
+pub(crate) fn weighted_blocks(
+    heights: &Grid<f32>,
+    side: usize,
+    weight: impl Fn(usize) -> f32,
+) -> (Grid<f32>, Grid<f32>) {
+    let (width, height) = (heights.width(), heights.height());
+    let (columns, rows) = (width.div_ceil(side), height.div_ceil(side));
+    let (mut means, mut weights) = (Grid::filled(columns, rows, f32::NAN), Grid::filled(columns, rows, 0.0));
+    for row in 0..rows {
+        for column in 0..columns {
+            let (mut sum, mut total) = (0.0_f64, 0.0_f64);
+            for y in row * side..(row * side + side).min(height) {
+                for at in y * width + column * side..y * width + (column * side + side).min(width) {
+                    let own = heights.data()[at];
+                    if !own.is_nan() {
+                        let weight = f64::from(weight(at));
+                        sum += weight * f64::from(own);
+                        total += weight;
+                    }
+                }
+            }
+            if total > 0.0 {
+                means[(column, row)] = (sum / total) as f32;
+                weights[(column, row)] = (total / (side * side) as f64) as f32;
+            }
+        }
+    }
+    (means, weights)
+}
+
 /// Returns the means over windows of `2·radius + 1` cells, cut at the borders.
 pub(crate) fn blurred(grid: &Grid<f32>, radius: usize) -> Grid<f32> {
     let (width, height) = (grid.width(), grid.height());

@@ -22,9 +22,9 @@ pub enum TerrainError {
         /// Values that are accepted.
         expected: &'static str,
     },
-    /// A mask has another size than the surface.
-    #[error("the mask has {} × {} cells, expected the {} × {} of the surface", found.0, found.1, expected.0, expected.1)]
-    Mask {
+    /// A layer has another size than the surface.
+    #[error("the layer has {} × {} cells, expected the {} × {} of the surface", found.0, found.1, expected.0, expected.1)]
+    Layer {
         /// Columns and rows that were given.
         found: (usize, usize),
         /// Columns and rows of the surface.

@@ -48,7 +48,7 @@ const SMOOTH_SHARE: f64 = 0.1;
 /// Half-width of the planes that tell the noise of the ground, metres.
 const NOISE_HALF_WIDTH_M: f64 = 2.0;
 /// Least noise, metres: what quantised heights have.
-const NOISE_MIN_M: f64 = 0.01;
+pub(crate) const NOISE_MIN_M: f64 = 0.01;
 
 /// The ground under a surface.
 #[derive(Debug, Clone)]
@@ -92,7 +92,7 @@ pub fn bare_ground(
 /// the canopy of a forest is taken with them, because they lie between crowns there.
 ///
 /// # Errors
-/// As [`bare_ground`], and [`TerrainError::Mask`] for a mask of another size.
+/// As [`bare_ground`], and [`TerrainError::Layer`] for a mask of another size.
 pub fn bare_ground_of_observed(
     surface: &Grid<f32>,
     unobserved: Option<&Grid<bool>>,
@@ -106,9 +106,9 @@ pub fn bare_ground_of_observed(
     }
     let expected = (surface.width(), surface.height());
     if let Some(found) = unobserved.map(|mask| (mask.width(), mask.height())).filter(|found| *found != expected) {
-        return Err(TerrainError::Mask { found, expected });
+        return Err(TerrainError::Layer { found, expected });
     }
-    let side = ((WORK_CELL_M / cell_m).round() as usize).max(1);
+    let side = work_side(cell_m);
     let work_m = cell_m * side as f64;
     progress.begin("ground", 2 * radii(config.widest_object_m / work_m).len());
     let whole_m = blocks(surface, side);
@@ -161,6 +161,11 @@ pub fn bare_ground_of_observed(
     // Known ground keeps its height.
     under.data_mut().iter_mut().zip(ground.data()).filter(|(_, h)| !h.is_nan()).for_each(|(under, h)| *under = *h);
     Ok(at_cells(&observed, &ground, &under, side, config.widest_object_m / work_m))
+}
+
+/// Number of cells along the side of one of the cells that the work is done on.
+pub(crate) fn work_side(cell_m: f64) -> usize {
+    ((WORK_CELL_M / cell_m).round() as usize).max(1)
 }
 
 /// Returns the cells of pits, none in a surface without any height, which has no trend.

@@ -1,6 +1,6 @@
 //! The bare ground under the buildings and trees of a surface model.
 //!
-//! The method has five parts, all in metres and slopes:
+//! The method has six parts, all in metres and slopes:
 //!
 //! 1. **Pits**, **islands** and **forests** are set aside: places below the ground around them, a
 //!    few observed cells between unobserved ones, and wide areas of rough cells between which no
@@ -21,6 +21,8 @@
 //!    around them.
 //! 5. Under forests the plate is guided by the **tree tops**, whose height above the ground is
 //!    known beside clearings, or by gaps that reach down to the ground.
+//! 6. Where the surface says how uncertain its heights are, the ground is **smoothed** as far as
+//!    they are: [`without_noise`].
 //!
 //! Heights are in metres above any datum, NaN is a void. The work is done on cells of about a metre
 //! and takes memory in proportion to the cells.
@@ -40,9 +42,11 @@ mod plate;
 mod regions;
 mod rejoin;
 mod runs;
+mod smooth;
 mod stray;
 mod trend;
 
 pub use config::GroundConfig;
 pub use error::TerrainError;
 pub use ground::{BareGround, GROUND, UNDER_OBJECT, UNKNOWN, VOID_FILLED, bare_ground, bare_ground_of_observed};
+pub use smooth::without_noise;

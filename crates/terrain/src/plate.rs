@@ -10,7 +10,7 @@ use std::ops::Range;
 
 use raster::Grid;
 
-use crate::coarse::widened;
+use crate::coarse::{weighted_blocks, widened};
 use crate::membrane::{completed, filled, halved};
 use crate::runs::{Run, runs};
 
@@ -22,7 +22,7 @@ const RELAXATION: f32 = 1.5;
 const MARGIN: usize = 4;
 /// Usual curvature of the ground, 1/m, against which its noise is weighed. Half and twice of it
 /// change the errors of simulated towns by a tenth.
-const CURVATURE: f64 = 0.01;
+pub(crate) const CURVATURE: f64 = 0.01;
 /// Length of the tension, metres: half of the width of a large building. Wider gaps are too wide to
 /// extrapolate a slope into.
 const TENSION_M: f64 = 40.0;
@@ -40,6 +40,24 @@ pub(crate) fn plate(known: &Grid<f32>, cell_m: f64, noise_m: f64) -> Grid<f32> {
     let counts = known.map(|h| if h.is_nan() { 0.0 } else { 1.0 });
     let weight = (cell_m * CURVATURE / noise_m).powi(2);
     solved(known, &counts, cell_m, weight as f32)
+}
+
+/// Returns the plate through heights with the weights (κ/σ)² per square metre, 1/m⁴. NaN cells have
+/// the weight 0.
+pub(crate) fn smooth_plate(heights: &Grid<f32>, weights: &Grid<f32>, cell_m: f64) -> Grid<f32> {
+    if heights.width().min(heights.height()) <= COARSEST {
+        return filled(heights);
+    }
+    let (means, mean_weights) = weighted_blocks(heights, 2, |at| weights.data()[at]);
+    let coarse = smooth_plate(&means, &mean_weights, 2.0 * cell_m);
+    let mut out = completed(&heights.map(|_| f32::NAN), &coarse);
+    let all = runs(&heights.map(|_| true));
+    let scale = cell_m.powi(4) as f32;
+    let mut level = Level::new(heights, weights.map(|weight| weight * scale), (cell_m / TENSION_M).powi(2) as f32);
+    for _ in 0..SWEEPS {
+        all.iter().for_each(|run| level.relax(&mut out, run));
+    }
+    out
 }
 
 /// Solves one level. `weight` is that of a known cell of the finest level, 1/m².

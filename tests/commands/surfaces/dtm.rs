@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use crate::common::{band, skysweep};
 use crs::Crs;
 use io::raster::{Band, BandData, CogRaster, read_dem, write_cog};
+use numeric::random::{hash64, unit_interval};
 use predicates::prelude::*;
 use raster::Grid;
 use serde_json::Value;
@@ -129,4 +130,43 @@ fn layers_beside_a_surface_say_what_was_not_measured() {
     for (option, name) in [("--slope=-1", "slope"), ("--widest-object=0", "widest")] {
         run("refused", &[option]).code(2).stderr(predicate::str::contains(name));
     }
+}
+
+/// Standard errors beside a noisy surface take most of its noise out of the ground.
+#[test]
+fn standard_errors_beside_a_surface_smooth_its_ground() {
+    let folder = tempfile::tempdir().unwrap();
+    let surface = folder.path().join("dsm.tif");
+    let dem = read_dem(town().join("dsm.tif")).unwrap();
+    let (width, height) = (dem.heights.width(), dem.heights.height());
+    let crs = Crs::ellipsoidal(dem.horizontal_epsg.unwrap());
+    let write = |path: &Path, grid: &Grid<f32>, holds_heights: bool| {
+        let bands = [Band { description: "layer", data: BandData::F32(grid) }];
+        let raster = CogRaster { holds_heights, ..CogRaster::new(&bands, dem.geotransform, crs) };
+        write_cog(path, &raster, false).unwrap();
+    };
+    // Noise of up to 0.4 m that is alike in 3 × 3 cells.
+    let noise = |at: usize| {
+        let patch = at % width / 3 + 1000 * (at / width / 3);
+        0.8 * unit_interval(hash64(patch as u64)) as f32 - 0.4
+    };
+    let noisy = (0..width * height).map(|at| dem.heights.data()[at] + noise(at)).collect();
+    write(&surface, &Grid::from_vec(width, height, noisy).unwrap(), true);
+    let truth = band(&town().join("dtm.tif"), 1);
+    let rmse = |name: &str, words: &str| {
+        let out = folder.path().join(name);
+        let mut command = skysweep();
+        command.arg("dtm").arg(&surface).arg("-o").arg(&out).args(["--progress", "none"]);
+        command.assert().code(0).stdout(predicate::str::contains(words));
+        let (found, states) = (band(&out.join("dtm.tif"), 1), band(&out.join("ground.tif"), 1));
+        let above = band(&out.join("height_above_ground.tif"), 1);
+        let ground: Vec<usize> = (0..width * height).filter(|&at| states.data()[at] == 1.0).collect();
+        assert!(ground.iter().all(|&at| above.data()[at] == 0.0));
+        let squares = ground.iter().map(|&at| f64::from(found.data()[at] - truth.data()[at]).powi(2));
+        (squares.sum::<f64>() / ground.len() as f64).sqrt()
+    };
+    let plain = rmse("plain", "none beside the surface");
+    write(&folder.path().join("sigma.tif"), &dem.heights.map(|_| 0.23), false);
+    let smooth = rmse("smooth", "sigma.tif");
+    assert!(smooth < 0.5 * plain, "{plain:.3} m, smoothed {smooth:.3} m");
 }

@@ -253,7 +253,8 @@ impl Search<'_> {
     }
 
     /// Refines a shift by compass search: it moves to the best of eight neighbours while that
-    /// improves, then halves the step. A shift that was tried before cannot be better than the best.
+    /// improves, then halves the step. A shift that was tried before cannot be better than the
+    /// best.
     fn refined(&self, samples: &[Sample], start: Candidate) -> Candidate {
         let least = (LEAST_OVERLAP * start.n as f64) as usize;
         let is_near = |c: f64, r: f64| (c - start.columns).abs().max((r - start.rows).abs()) <= MOST_REFINEMENT_CELLS;

@@ -1,7 +1,8 @@
 //! What a surface says of its cells: the layers that a DSM run writes beside `dsm.tif`.
 //!
 //! Filled cells are no evidence of the ground, and neither are cells whose height is hardly ever
-//! right. The other layers are not needed: weak cells still show much ground.
+//! right. Other weak cells still show much ground. The standard errors tell how far the ground is
+//! smoothed.
 
 use io::raster::Dem;
 use raster::Grid;
@@ -14,6 +15,8 @@ use job::files::FileError;
 /// Probability below which a cell is no evidence. Of such cells of two simulated scenes (hills and
 /// random:9601), one in twenty showed the ground, and two in five lay metres below it.
 const LEAST_CONFIDENCE: f32 = 0.1;
+/// Standard error of each height, metres.
+const SIGMA: &str = "sigma.tif";
 
 /// Layers that were found beside a surface, and what they say.
 #[derive(Debug, Clone, Default, Serialize)]
@@ -34,7 +37,12 @@ impl SurfaceLayers {
             return NO_LAYERS.to_owned();
         }
         let (filled, weak) = (self.cells_filled, self.cells_weak);
-        format!("{}: {filled} filled and {weak} weak cells are no evidence of the ground", self.files.join(", "))
+        let is_smoothed = self.files.iter().any(|name| name == SIGMA);
+        let smoothed = if is_smoothed { "; the ground is smoothed as far as its heights are uncertain" } else { "" };
+        format!(
+            "{}: {filled} filled and {weak} weak cells are no evidence of the ground{smoothed}",
+            self.files.join(", ")
+        )
     }
 }
 
@@ -48,4 +56,15 @@ pub(crate) fn unobserved(surface: &Dem) -> Result<(Option<Grid<bool>>, SurfaceLa
     let found = surface_layer::weak_cells(surface, LEAST_CONFIDENCE).map_err(FileError::write)?;
     let layers = SurfaceLayers { files: found.files, cells_filled: found.filled, cells_weak: found.doubtful };
     Ok((found.mask, layers))
+}
+
+/// Reads the standard errors of the heights, metres, if they lie beside the surface, and adds their
+/// file to the layers.
+///
+/// # Errors
+/// As [`unobserved`].
+pub(crate) fn standard_errors(surface: &Dem, layers: &mut SurfaceLayers) -> Result<Option<Grid<f32>>, DtmError> {
+    let sigma_m = surface_layer::layer_beside(surface, SIGMA).map_err(FileError::write)?;
+    layers.files.extend(sigma_m.is_some().then(|| SIGMA.to_owned()));
+    Ok(sigma_m)
 }

@@ -1,15 +1,16 @@
 //! The DTM job: the bare ground under a surface model, and the heights above it.
 //!
 //! Where the layers of a DSM run lie beside the surface, filled cells and those that are hardly
-//! ever right are no evidence of the ground.
+//! ever right are no evidence of the ground. The ground is smoothed as far as the standard errors
+//! of the heights ask for.
 //!
 //! Three rasters and a report are written into one folder, on the grid and in the vertical datum of
 //! the surface:
 //!
 //! - `dtm.tif`: heights of the ground, metres; no-data where no ground is near.
-//! - `height_above_ground.tif`: surface minus ground, metres. It is never below 0: where the
-//!   surface lies below the interpolated ground (noise, outliers), the height is 0. No-data where
-//!   the surface or the ground is unknown.
+//! - `height_above_ground.tif`: surface minus ground, metres. It is 0 where the surface shows the
+//!   ground, and where the surface lies below the interpolated ground (noise, outliers). No-data
+//!   where the surface or the ground is unknown.
 //! - `ground.tif`: 0 unknown, 1 ground as observed, 2 interpolated under an object, 3 interpolated
 //!   in a void of the surface.
 //! - `dtm.json`: the report.

@@ -5,11 +5,11 @@ use io::raster::{Band, BandData, CogRaster, Dem, read_dem, write_cog};
 use numeric::Progress;
 use raster::Grid;
 use report::{Legend, LightEnd, MapLayer};
-use terrain::{BareGround, GROUND, UNDER_OBJECT, UNKNOWN, VOID_FILLED, bare_ground_of_observed};
+use terrain::{BareGround, GROUND, UNDER_OBJECT, UNKNOWN, VOID_FILLED, bare_ground_of_observed, without_noise};
 
 use super::config::DtmConfig;
 use super::error::DtmError;
-use super::layers::unobserved;
+use super::layers::{standard_errors, unobserved};
 use super::report::DtmReport;
 use job::error::JobError;
 use job::files::{self, FileError};
@@ -63,11 +63,15 @@ fn steps(config: &DtmConfig, progress: &dyn Progress) -> Result<DtmReport, DtmEr
     threads::install(config.threads, || {
         let (surface, cell_m, crs) = read_surface(config, progress)?;
         let folder = OutputFolder::take(&config.output)?;
-        let (unobserved, layers) = unobserved(&surface)?;
-        let terrain =
+        let (unobserved, mut layers) = unobserved(&surface)?;
+        let sigma_m = standard_errors(&surface, &mut layers)?;
+        let mut terrain =
             bare_ground_of_observed(&surface.heights, unobserved.as_ref(), cell_m, &config.terrain, progress)?;
+        if let Some(sigma_m) = sigma_m {
+            terrain = without_noise(terrain, &sigma_m, cell_m)?;
+        }
         progress.check_cancelled()?;
-        let (above, cells_below_ground) = heights_above(&surface.heights, &terrain.heights);
+        let (above, cells_below_ground) = heights_above(&surface.heights, &terrain);
         let report = DtmReport { cells_below_ground, layers, ..report(config, &surface, &terrain, cell_m, crs) };
         warn_of_little_ground(&surface, &report, progress);
         write(config, &folder, &surface, &terrain, &above, crs, &report)?;
@@ -111,14 +115,17 @@ pub(crate) fn read_surface(config: &DtmConfig, progress: &dyn Progress) -> Resul
     Ok((surface, (width_m * height_m).sqrt(), Crs { horizontal, vertical }))
 }
 
-/// Returns the heights of the surface above the ground, not below 0, and the number of cells that
-/// were.
-fn heights_above(surface: &Grid<f32>, ground: &Grid<f32>) -> (Grid<f32>, usize) {
+/// Returns the heights of the surface above the ground and the number of cells that lay below it.
+/// They are 0 there, and where the surface shows the ground itself, whose noise is no height.
+fn heights_above(surface: &Grid<f32>, terrain: &BareGround) -> (Grid<f32>, usize) {
     let mut above = surface.clone();
     let mut below = 0;
-    for (cell, ground) in above.data_mut().iter_mut().zip(ground.data()) {
+    let ground = terrain.heights.data().iter().zip(terrain.states.data());
+    for (cell, (ground, state)) in above.data_mut().iter_mut().zip(ground) {
         *cell -= ground;
-        if *cell < 0.0 {
+        if *state == GROUND {
+            *cell = 0.0;
+        } else if *cell < 0.0 {
             below += 1;
             *cell = 0.0;
         }
