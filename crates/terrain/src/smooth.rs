@@ -3,8 +3,8 @@
 //! The noise of a surface made from images is alike in neighbouring cells, so it looks like bumps
 //! of the ground. The surface says how large it is: every height comes with its standard error. The
 //! ground is the thin plate of [`crate::plate`] through all heights, which counts each by its
-//! standard error, so bumps vanish that are lower than the noise. What stands out of the plate by
-//! more than the noise, such as a retaining wall, keeps its height.
+//! standard error, so bumps vanish that are lower than the noise. Areas that stand out of the plate
+//! by more than the noise, as beside a retaining wall, keep their heights.
 
 use raster::Grid;
 
@@ -13,11 +13,15 @@ use crate::config::NOISE_DEVIATIONS;
 use crate::error::TerrainError;
 use crate::ground::{BareGround, GROUND, NOISE_MIN_M, work_side};
 use crate::plate::{CURVATURE, smooth_plate};
+use crate::regions::Regions;
 
 /// Standard error of heights that were interpolated, metres: about the error of the ground under
-/// objects of places seen in images (`benches/results/terrain_outside.md`). They hold the plate where
-/// nothing else does, under forests. Half and twice of it hardly matter.
+/// objects of places seen in images (`benches/results/terrain_outside.md`). They hold the plate
+/// where nothing else does, under forests. Half and twice of it hardly matter.
 const INTERPOLATED_M: f32 = 0.5;
+/// Smallest area of heights that stand out of the plate and are a step of the ground, square
+/// metres: two metres on both sides of a wall of some metres. Smaller ones are wrong matches.
+const LEAST_STEP_M2: f64 = 10.0;
 
 /// Smooths the ground as far as its heights are uncertain. `sigma_m` holds the standard error of
 /// each height of the surface, metres, and NaN where it has none.
@@ -51,13 +55,21 @@ pub fn without_noise(ground: BareGround, sigma_m: &Grid<f32>, cell_m: f64) -> Re
     // The standard errors count as if those of neighbours were independent.
     let (means, weights) = weighted_blocks(&heights, side, |at| ((CURVATURE / cell_m) as f32 / sigma_of(at)).powi(2));
     let plate = smooth_plate(&means, &weights, cell_m * side as f64);
-    let columns = heights.width();
-    for (at, height) in heights.data_mut().iter_mut().enumerate() {
-        let smooth = at_cell(&plate, side, at % columns, at / columns);
-        let limit_m = if states.data()[at] == GROUND { NOISE_DEVIATIONS as f32 * sigma_of(at) } else { f32::INFINITY };
-        // NaN stays.
-        if (*height - smooth).abs() <= limit_m {
-            *height = smooth;
+    let smooth = |at: usize| at_cell(&plate, side, at % expected.0, at / expected.0);
+    let mut is_step = heights.map(|_| false);
+    for (at, is_step) in is_step.data_mut().iter_mut().enumerate() {
+        let limit_m = NOISE_DEVIATIONS as f32 * sigma_of(at);
+        *is_step = states.data()[at] == GROUND && (heights.data()[at] - smooth(at)).abs() > limit_m;
+    }
+    let regions = Regions::of(&is_step);
+    for region in (0..regions.len()).map(|region| regions.cells(region)) {
+        if (region.len() as f64) < LEAST_STEP_M2 / (cell_m * cell_m) {
+            region.iter().for_each(|&at| is_step.data_mut()[at as usize] = false);
+        }
+    }
+    for (at, height) in heights.data_mut().iter_mut().enumerate().filter(|(_, height)| !height.is_nan()) {
+        if !is_step.data()[at] {
+            *height = smooth(at);
         }
     }
     Ok(BareGround { heights, states })
@@ -108,6 +120,13 @@ mod tests {
         };
         assert!(worst(0..SIDE) <= 0.3, "{}", worst(0..SIDE));
         assert!(worst(0..SIDE / 2 - 20) < 0.1, "{}", worst(0..SIDE / 2 - 20));
+    }
+
+    #[test]
+    fn a_speck_goes() {
+        let flat = |column: usize, row: usize| if (40..43).contains(&column) && row == 70 { 12.0 } else { 10.0 };
+        let found = without_noise(ground_of(flat), &Grid::filled(SIDE, SIDE, 0.1), CELL_M).unwrap();
+        assert!((found.heights[(41, 70)] - 10.0).abs() < 0.1, "{}", found.heights[(41, 70)]);
     }
 
     #[test]
