@@ -5,7 +5,8 @@
 
 The ISPRS filter test, LiDAR of Delft, JAX_214 and JAX_068, the images of JAX_068, and surfaces that `skysweep dsm` makes of
 the scenes of ../shared/tools/scenes.py, with images of 448 pixels on a side. A scene lies in FOLDER/scenes/rSEED (images,
-truth, run/), and is made where it is missing. `--before` is a second program whose figures stand beside. Writes benches/results/terrain_outside.json and
+truth, run/), and is made where it is missing. `--before` is a second program whose figures stand beside; the ground of the
+first scene by both goes to docs/figures/terrain_noise.png. Writes benches/results/terrain_outside.json and
 terrain_outside.md. Needs Python with numpy, scipy and rasterio.
 """
 import argparse
@@ -17,6 +18,7 @@ import sys
 import tempfile
 
 import numpy as np
+import rasterio
 
 import dtm
 
@@ -29,6 +31,8 @@ TERRAIN = SHARED / "data/terrain"
 JAX_068 = SHARED / "data/stereo/jax_068/truth"
 # Scenes of which none was looked at before the constants of `terrain::without_noise` were chosen.
 BLIND = [9856, 9858, 9859, 9861, 9862, 9863, 9865, 9873, 9875, 9876, 9878]
+# Side of the picture, cells.
+PICTURE_CELLS = 300
 LIDAR = {
     "Delft": [TERRAIN / "ahn3_delft" / f"ahn3_delft_{name}.tif" for name in ["dsm", "class", "ground"]],
     "JAX_214": [TERRAIN / "jax_tiles/JAX_214_DSM_georef.tif", TERRAIN / "jax_tiles/JAX_214_CLS.tif"],
@@ -92,6 +96,27 @@ def scene(program, seed, work):
             f"{name}, from images, RMSE under objects, m": found["rmse_under_objects_m"]}
 
 
+def shaded(path):
+    """A hillshade of the middle of a ground, light from the north-west."""
+    ground, profile = dtm.read(path)
+    middle = tuple(slice((n - PICTURE_CELLS) // 2, (n + PICTURE_CELLS) // 2) for n in ground.shape)
+    down, right = np.gradient(ground[middle], profile["transform"].a)
+    return (1.0 + right + down) / np.sqrt(3.0 + 3.0 * (right ** 2 + down ** 2))
+
+
+def picture(programs, options, path):
+    """The ground of the first drawn place by each program, side by side."""
+    folder = options.work / f"scenes/r{options.seeds[0]}"
+    parts = [shaded(terrain(program, folder / "run", options.work / f"made/picture_{number}"))
+             for number, program in enumerate(programs)]
+    low, high = np.nanpercentile(parts[0], [2, 98])
+    gap = np.full((PICTURE_CELLS, 8), high)
+    image = np.hstack([parts[0], *[part for other in parts[1:] for part in (gap, other)]])
+    image = np.clip(255.0 * (image - low) / (high - low), 0, 255).astype(np.uint8)
+    with rasterio.open(path, "w", driver="PNG", height=image.shape[0], width=image.shape[1], count=1, dtype="uint8") as out:
+        out.write(image, 1)
+
+
 def measured(program, options):
     results = isprs(program)
     for name, files in LIDAR.items():
@@ -118,6 +143,7 @@ def main():
     report = {"skysweep": measured(options.skysweep, options)}
     if options.before:
         report["before"] = measured(options.before, options)
+        picture([options.before, options.skysweep], options, ROOT / "docs/figures/terrain_noise.png")
     names = list(report)
     lines = ["# Terrain on other places", "", "Made by `benches/peers/terrain_outside.py`. Lower is better.", ""]
     if options.before:
