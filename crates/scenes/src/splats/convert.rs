@@ -116,7 +116,9 @@ impl SplatConvertReport {
 /// let town = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../data-samples/town"));
 /// let folder = tempfile::tempdir()?;
 /// let ply = folder.path().join("town.ply");
-/// make(&SplatsConfig::new(town.join("truth/dsm.tif"), vec![town.join("view_1.tif")], ply.clone()), &numeric::Silent)?;
+/// let mut coarse = SplatsConfig::new(town.join("truth/dsm.tif"), vec![town.join("view_1.tif")], ply.clone());
+/// (coarse.uniform_side, coarse.compare) = (Some(4), false);
+/// make(&coarse, &numeric::Silent)?;
 /// let report = convert(&SplatConvertConfig::new(ply, folder.path().join("small.spz")), &numeric::Silent)?;
 /// assert!(4 * report.bytes < report.bytes_before);
 /// # Ok::<(), Box<dyn std::error::Error>>(())

@@ -141,7 +141,9 @@ impl SplatLabelReport {
 /// let town = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../data-samples/town"));
 /// let folder = tempfile::tempdir()?;
 /// let ply = folder.path().join("town.ply");
-/// make(&SplatsConfig::new(town.join("truth/dsm.tif"), vec![town.join("view_1.tif")], ply.clone()), &numeric::Silent)?;
+/// let mut coarse = SplatsConfig::new(town.join("truth/dsm.tif"), vec![town.join("view_1.tif")], ply.clone());
+/// (coarse.uniform_side, coarse.compare) = (Some(4), false);
+/// make(&coarse, &numeric::Silent)?;
 /// let city = town.join("truth/buildings.city.json");
 /// let report = label(&SplatLabelConfig::new(ply, city, folder.path().join("labelled.ply")), &numeric::Silent)?;
 /// assert!(report.objects > 0 && report.labelled < report.splats);

@@ -169,7 +169,7 @@ impl SplatsReport {
 /// let folder = tempfile::tempdir()?;
 /// let images = vec![town.join("view_1.tif")];
 /// let mut config = SplatsConfig::new(town.join("truth/dsm.tif"), images, folder.path().join("town.ply"));
-/// config.error_m = 1.0;
+/// (config.uniform_side, config.compare) = (Some(4), false);
 /// let report = make(&config, &numeric::Silent)?;
 /// assert!(report.made.splats < report.made.cells && config.output.is_file());
 /// # Ok::<(), Box<dyn std::error::Error>>(())

@@ -161,7 +161,9 @@ impl SplatRenderConfig {
 /// let folder = tempfile::tempdir()?;
 /// let images = vec![town.join("view_1.tif")];
 /// let ply = folder.path().join("town.ply");
-/// make(&SplatsConfig::new(town.join("truth/dsm.tif"), images.clone(), ply.clone()), &numeric::Silent)?;
+/// let mut coarse = SplatsConfig::new(town.join("truth/dsm.tif"), images.clone(), ply.clone());
+/// (coarse.uniform_side, coarse.compare) = (Some(4), false);
+/// make(&coarse, &numeric::Silent)?;
 /// let mut config = SplatRenderConfig::new(ply, folder.path().join("seen"));
 /// config.images = images;
 /// let report = render(&config, &numeric::Silent)?;
