@@ -26,11 +26,11 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.append(str(ROOT / "benches/peers/terrain"))
 import places  # noqa: E402
 
-SHARED = ROOT.parent / "shared"
+SHARED = places.SHARED
 TERRAIN = SHARED / "data/terrain"
 JAX_068 = SHARED / "data/stereo/jax_068/truth"
 # Scenes of which none was looked at before the constants of `terrain::without_noise` were chosen.
-BLIND = [9856, 9858, 9859, 9861, 9862, 9863, 9865, 9873, 9875, 9876, 9878]
+BLIND = [9856, 9858, 9859, 9861, 9862, 9863, 9865, 9873, 9875, 9876, 9877, 9878]
 # Side of the picture, cells.
 PICTURE_CELLS = 300
 LIDAR = {

@@ -9,7 +9,8 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use assert_cmd::Command;
-use io::raster::ImageSource;
+use crs::Crs;
+use io::raster::{Band, BandData, CogRaster, Dem, ImageSource, write_cog};
 use raster::Grid;
 use serde_json::Value;
 
@@ -53,6 +54,14 @@ pub(crate) fn simulated(name: &str, changes: &[(&str, &str)]) -> PathBuf {
 pub(crate) fn band(path: &Path, number: usize) -> Grid<f32> {
     let source = ImageSource::open(path).unwrap();
     source.read_samples(number, source.window()).unwrap()
+}
+
+/// Writes a raster on the cells and the map of a surface.
+pub(crate) fn write_like(path: &Path, surface: &Dem, data: BandData<'_>, holds_heights: bool) {
+    let bands = [Band { description: "layer", data }];
+    let crs = Crs::ellipsoidal(surface.horizontal_epsg.unwrap());
+    let raster = CogRaster { holds_heights, ..CogRaster::new(&bands, surface.geotransform, crs) };
+    write_cog(path, &raster, true).unwrap();
 }
 
 /// Checks that a command succeeded, and parses its JSON output.

@@ -11,9 +11,13 @@ pub const FILLED: u8 = 1;
 /// Value of `filled` in a cell without a height.
 pub const VOID: u8 = 255;
 /// Where each height comes from.
-const SOURCE: &str = "source.tif";
+pub(crate) const SOURCE: &str = "source.tif";
+/// Whether each height was filled.
+pub(crate) const FILLED_FLAGS: &str = "filled.tif";
+/// Standard error of each height, metres.
+pub(crate) const SIGMA: &str = "sigma.tif";
 /// Probability that each height is right.
-const CONFIDENCE: &str = "confidence.tif";
+pub(crate) const CONFIDENCE: &str = "confidence.tif";
 /// What a report says of a surface without layers.
 pub(crate) const NO_LAYERS: &str = "none beside the surface: every height counts as observed";
 

@@ -3,6 +3,7 @@
 
 use raster::Grid;
 
+use crate::coarse::weighted_blocks;
 use crate::runs::{Run, runs};
 
 /// Sweeps over the unknown cells of each level. The coarser level has done the rest.
@@ -55,23 +56,7 @@ fn relax(out: &mut Grid<f32>, Run { row, columns }: &Run, ahead: &mut Vec<f32>) 
 
 /// Means of the known heights of 2 × 2 cells.
 pub(crate) fn halved(fine: &Grid<f32>) -> Grid<f32> {
-    let (width, height) = (fine.width().div_ceil(2), fine.height().div_ceil(2));
-    let mut coarse = Grid::filled(width, height, f32::NAN);
-    for row in 0..height {
-        for column in 0..width {
-            let (mut sum, mut count) = (0.0_f64, 0);
-            for (dx, dy) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
-                if let Some(h) = fine.get(2 * column + dx, 2 * row + dy).filter(|h| !h.is_nan()) {
-                    sum += f64::from(*h);
-                    count += 1;
-                }
-            }
-            if count > 0 {
-                coarse[(column, row)] = (sum / f64::from(count)) as f32;
-            }
-        }
-    }
-    coarse
+    weighted_blocks(fine, 2, |_| 1.0).0
 }
 
 /// Returns the heights with the NaN cells interpolated from the level that is half as fine.

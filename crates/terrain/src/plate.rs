@@ -50,14 +50,10 @@ pub(crate) fn smooth_plate(heights: &Grid<f32>, weights: &Grid<f32>, cell_m: f64
     }
     let (means, mean_weights) = weighted_blocks(heights, 2, |at| weights.data()[at]);
     let coarse = smooth_plate(&means, &mean_weights, 2.0 * cell_m);
-    let mut out = completed(&heights.map(|_| f32::NAN), &coarse);
-    let all = runs(&heights.map(|_| true));
     let scale = cell_m.powi(4) as f32;
-    let mut level = Level::new(heights, weights.map(|weight| weight * scale), (cell_m / TENSION_M).powi(2) as f32);
-    for _ in 0..SWEEPS {
-        all.iter().for_each(|run| level.relax(&mut out, run));
-    }
-    out
+    let level = Level::new(heights, weights.map(|weight| weight * scale), cell_m);
+    let start = completed(&heights.map(|_| f32::NAN), &coarse);
+    level.relaxed(start, &runs(&heights.map(|_| true)))
 }
 
 /// Solves one level. `weight` is that of a known cell of the finest level, 1/m².
@@ -70,15 +66,9 @@ fn solved(known: &Grid<f32>, counts: &Grid<f32>, cell_m: f64, weight: f32) -> Gr
         return known.clone();
     }
     let coarse = solved(&halved(known), &halved_sums(counts), 2.0 * cell_m, weight);
-    let mut out = completed(known, &coarse);
-    let active = runs(&widened(&is_unknown, MARGIN));
     let weight = weight * (cell_m * cell_m) as f32;
-    let tension = (cell_m / TENSION_M).powi(2) as f32;
-    let mut level = Level::new(known, counts.map(|count| weight * count), tension);
-    for _ in 0..SWEEPS {
-        active.iter().for_each(|run| level.relax(&mut out, run));
-    }
-    out
+    let level = Level::new(known, counts.map(|count| weight * count), cell_m);
+    level.relaxed(completed(known, &coarse), &runs(&widened(&is_unknown, MARGIN)))
 }
 
 /// Sums of 2 × 2 cells.
@@ -106,10 +96,19 @@ struct Level {
 }
 
 impl Level {
-    fn new(known: &Grid<f32>, weights: Grid<f32>, tension: f32) -> Self {
+    fn new(known: &Grid<f32>, weights: Grid<f32>, cell_m: f64) -> Self {
+        let tension = (cell_m / TENSION_M).powi(2) as f32;
         let heights = known.map(|h| if h.is_nan() { 0.0 } else { *h });
         let gains = weights.map(|weight| RELAXATION / (20.0 + 4.0 * tension + weight));
         Self { weights, heights, gains, tension, ahead: Vec::with_capacity(known.width()) }
+    }
+
+    /// Moves the cells of the runs from where they are to the heights with the least energy.
+    fn relaxed(mut self, mut heights: Grid<f32>, active: &[Run]) -> Grid<f32> {
+        for _ in 0..SWEEPS {
+            active.iter().for_each(|run| self.relax(&mut heights, run));
+        }
+        heights
     }
 
     /// Moves the cells of a run, from left to right, towards the heights with the least energy.

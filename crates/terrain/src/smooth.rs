@@ -56,17 +56,14 @@ pub fn without_noise(ground: BareGround, sigma_m: &Grid<f32>, cell_m: f64) -> Re
     let (means, weights) = weighted_blocks(&heights, side, |at| ((CURVATURE / cell_m) as f32 / sigma_of(at)).powi(2));
     let plate = smooth_plate(&means, &weights, cell_m * side as f64);
     let smooth = |at: usize| at_cell(&plate, side, at % expected.0, at / expected.0);
-    let mut is_step = heights.map(|_| false);
-    for (at, is_step) in is_step.data_mut().iter_mut().enumerate() {
+    let mut stands_out = heights.map(|_| false);
+    for (at, stands_out) in stands_out.data_mut().iter_mut().enumerate() {
         let limit_m = NOISE_DEVIATIONS as f32 * sigma_of(at);
-        *is_step = states.data()[at] == GROUND && (heights.data()[at] - smooth(at)).abs() > limit_m;
+        *stands_out = states.data()[at] == GROUND && (heights.data()[at] - smooth(at)).abs() > limit_m;
     }
-    let regions = Regions::of(&is_step);
-    for region in (0..regions.len()).map(|region| regions.cells(region)) {
-        if (region.len() as f64) < LEAST_STEP_M2 / (cell_m * cell_m) {
-            region.iter().for_each(|&at| is_step.data_mut()[at as usize] = false);
-        }
-    }
+    let regions = Regions::of(&stands_out);
+    let least = LEAST_STEP_M2 / (cell_m * cell_m);
+    let is_step = regions.mask(|region| regions.cells(region).len() as f64 >= least);
     for (at, height) in heights.data_mut().iter_mut().enumerate().filter(|(_, height)| !height.is_nan()) {
         if !is_step.data()[at] {
             *height = smooth(at);

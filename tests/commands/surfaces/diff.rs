@@ -3,9 +3,8 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::common::{band, skysweep};
-use crs::Crs;
-use io::raster::{Band, BandData, CogRaster, read_dem, write_cog};
+use crate::common::{band, skysweep, write_like};
+use io::raster::{BandData, read_dem};
 use predicates::prelude::*;
 use raster::Grid;
 use serde_json::Value;
@@ -46,10 +45,8 @@ fn without_a_house(path: &Path) -> (f64, [f64; 4]) {
         }
         later.data_mut()[at] += noise;
     }
-    let crs = Crs::ellipsoidal(surface.horizontal_epsg.unwrap());
-    let bands = [Band { description: "height_m", data: BandData::F32(&later) }];
-    write_cog(path, &CogRaster::new(&bands, surface.geotransform, crs), false).unwrap();
-    let map = crs::MapProjection::from_epsg(crs.horizontal).unwrap();
+    write_like(path, &surface, BandData::F32(&later), true);
+    let map = crs::MapProjection::from_epsg(surface.horizontal_epsg.unwrap()).unwrap();
     let corner = |x: f64, y: f64| {
         let (x, y) = surface.geotransform.map_from_cell(x, y);
         map.lonlat_from_map(x, y).unwrap()
@@ -129,10 +126,7 @@ fn a_house_whose_heights_are_rather_wrong_is_no_change() {
         let heights = before.data().iter().zip(surface.heights.data());
         let stated = heights.map(|(before, after)| probability((before - after).abs())).collect();
         let grid = Grid::from_vec(before.width(), before.height(), stated).unwrap();
-        let bands = [Band { description: "confidence_0_to_1", data: BandData::F32(&grid) }];
-        let crs = Crs::ellipsoidal(surface.horizontal_epsg.unwrap());
-        let raster = CogRaster { holds_heights: false, ..CogRaster::new(&bands, surface.geotransform, crs) };
-        write_cog(folder.path().join("confidence.tif"), &raster, true).unwrap();
+        write_like(&folder.path().join("confidence.tif"), &surface, BandData::F32(&grid), false);
         let mut command = skysweep();
         command.arg("diff").arg(town().join("dsm.tif")).arg(&later).arg("-o").arg(folder.path().join("out"));
         command.args(["--sigma-m", "0.1", "--progress", "none", "--json", "--overwrite"]);
@@ -182,9 +176,7 @@ fn jitter_is_removed_by_blocks() {
         eval::bilinear(&surface.heights, column - sideways, row).map_or(f32::NAN, |h| (h + up) as f32 + noise)
     });
     let moved = Grid::from_vec(width, height, moved.collect()).unwrap();
-    let bands = [Band { description: "height_m", data: BandData::F32(&moved) }];
-    let crs = Crs::ellipsoidal(surface.horizontal_epsg.unwrap());
-    write_cog(&later, &CogRaster::new(&bands, surface.geotransform, crs), false).unwrap();
+    write_like(&later, &surface, BandData::F32(&moved), true);
     let run = |name: &str, options: &[&str]| {
         let mut command = skysweep();
         command.arg("diff").arg(town().join("dsm.tif")).arg(&later).arg("-o").arg(folder.path().join(name));

@@ -3,9 +3,8 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::common::{band, skysweep};
-use crs::Crs;
-use io::raster::{Band, BandData, CogRaster, read_dem, write_cog};
+use crate::common::{band, skysweep, write_like};
+use io::raster::{BandData, read_dem};
 use numeric::random::{hash64, unit_interval};
 use predicates::prelude::*;
 use raster::Grid;
@@ -95,15 +94,11 @@ fn layers_beside_a_surface_say_what_was_not_measured() {
 
     let dem = read_dem(&surface).unwrap();
     let (width, height) = (dem.heights.width(), dem.heights.height());
-    let crs = Crs::ellipsoidal(dem.horizontal_epsg.unwrap());
     let layer = |is_weak: &dyn Fn(usize) -> bool, values: [u8; 2]| {
         let cells = (0..width * height).map(|i| values[usize::from(is_weak(i % width))]).collect();
         Grid::from_vec(width, height, cells).unwrap()
     };
-    let write = |name: &str, grid: &Grid<u8>| {
-        let bands = [Band { description: "layer", data: BandData::U8(grid) }];
-        write_cog(folder.path().join(name), &CogRaster::new(&bands, dem.geotransform, crs), false).unwrap();
-    };
+    let write = |name: &str, grid: &Grid<u8>| write_like(&folder.path().join(name), &dem, BandData::U8(grid), false);
     // The western quarter was filled.
     write("source.tif", &layer(&|column| column < width / 4, [1, 4]));
     let filled = width / 4 * height;
@@ -139,19 +134,13 @@ fn standard_errors_beside_a_surface_smooth_its_ground() {
     let surface = folder.path().join("dsm.tif");
     let dem = read_dem(town().join("dsm.tif")).unwrap();
     let (width, height) = (dem.heights.width(), dem.heights.height());
-    let crs = Crs::ellipsoidal(dem.horizontal_epsg.unwrap());
-    let write = |path: &Path, grid: &Grid<f32>, holds_heights: bool| {
-        let bands = [Band { description: "layer", data: BandData::F32(grid) }];
-        let raster = CogRaster { holds_heights, ..CogRaster::new(&bands, dem.geotransform, crs) };
-        write_cog(path, &raster, false).unwrap();
-    };
     // Noise of up to 0.4 m that is alike in 3 × 3 cells.
     let noise = |at: usize| {
         let patch = at % width / 3 + 1000 * (at / width / 3);
         0.8 * unit_interval(hash64(patch as u64)) as f32 - 0.4
     };
     let noisy = (0..width * height).map(|at| dem.heights.data()[at] + noise(at)).collect();
-    write(&surface, &Grid::from_vec(width, height, noisy).unwrap(), true);
+    write_like(&surface, &dem, BandData::F32(&Grid::from_vec(width, height, noisy).unwrap()), true);
     let truth = band(&town().join("dtm.tif"), 1);
     let rmse = |name: &str, words: &str| {
         let out = folder.path().join(name);
@@ -166,7 +155,7 @@ fn standard_errors_beside_a_surface_smooth_its_ground() {
         (squares.sum::<f64>() / ground.len() as f64).sqrt()
     };
     let plain = rmse("plain", "none beside the surface");
-    write(&folder.path().join("sigma.tif"), &dem.heights.map(|_| 0.23), false);
+    write_like(&folder.path().join("sigma.tif"), &dem, BandData::F32(&dem.heights.map(|_| 0.23)), false);
     let smooth = rmse("smooth", "sigma.tif");
     assert!(smooth < 0.5 * plain, "{plain:.3} m, smoothed {smooth:.3} m");
 }

@@ -10,13 +10,8 @@ use raster::Grid;
 use super::error::ClassesError;
 use crate::eval::EvalJobError;
 use crate::eval::on_reference::surface_on_reference;
-use crate::surface_layer::OBSERVED;
-use crate::surface_layer::layer_beside;
+use crate::surface_layer::{FILLED_FLAGS, OBSERVED, SIGMA, layer_beside};
 use job::files::FileError;
-
-/// Rasters of a DSM run beside its surface model.
-const SIGMA: &str = "sigma.tif";
-const FILLED: &str = "filled.tif";
 
 /// A building index at the cells of a surface.
 pub(super) struct Cue {
@@ -42,7 +37,7 @@ impl Cue {
             let most_m = (0.5 * config.least_height_m) as f32;
             weak.data_mut().iter_mut().zip(sigma.data()).for_each(|(weak, s)| *weak |= *s >= most_m);
         }
-        if let Some(filled) = beside(surface, FILLED)? {
+        if let Some(filled) = beside(surface, FILLED_FLAGS)? {
             let observed = f32::from(OBSERVED);
             weak.data_mut().iter_mut().zip(filled.data()).for_each(|(weak, state)| *weak |= *state != observed);
         }
@@ -61,7 +56,7 @@ pub(super) fn unsure_heights(surface: &Dem) -> Result<Option<Grid<bool>>, Classe
     let mut known: Vec<f32> = sigma.data().iter().copied().filter(|s| s.is_finite()).collect();
     let Some(median) = upper_median(&mut known) else { return Ok(None) };
     let mut unsure = sigma.map(|s| *s > UNSURE * median);
-    if let Some(filled) = beside(surface, FILLED)? {
+    if let Some(filled) = beside(surface, FILLED_FLAGS)? {
         let observed = f32::from(OBSERVED);
         unsure.data_mut().iter_mut().zip(filled.data()).for_each(|(unsure, state)| *unsure |= *state != observed);
     }

@@ -9,14 +9,12 @@ use raster::Grid;
 use serde::Serialize;
 
 use super::error::DtmError;
-use crate::surface_layer::{self, NO_LAYERS};
+use crate::surface_layer::{self, NO_LAYERS, SIGMA};
 use job::files::FileError;
 
 /// Probability below which a cell is no evidence. Of such cells of two simulated scenes (hills and
 /// random:9601), one in twenty showed the ground, and two in five lay metres below it.
 const LEAST_CONFIDENCE: f32 = 0.1;
-/// Standard error of each height, metres.
-const SIGMA: &str = "sigma.tif";
 
 /// Layers that were found beside a surface, and what they say.
 #[derive(Debug, Clone, Default, Serialize)]

@@ -13,12 +13,8 @@ use raster::Grid;
 
 use super::error::EvalJobError;
 use super::grid_config::GridEvalConfig;
+use crate::surface_layer::{CONFIDENCE, FILLED_FLAGS, SIGMA, SOURCE};
 use job::error_text::with_causes;
-
-const SOURCE: &str = "source.tif";
-const FILLED: &str = "filled.tif";
-const SIGMA: &str = "sigma.tif";
-const CONFIDENCE: &str = "confidence.tif";
 
 /// Layers on the grid of the test.
 #[derive(Default)]
@@ -45,7 +41,7 @@ impl TestLayers {
         layers.origins = match layers.beside(test, SOURCE, notes) {
             Some(codes) => Some(codes.map(|&code| origin(code, CellOrigin::from_source_code))),
             None => {
-                let flags = layers.beside(test, FILLED, notes);
+                let flags = layers.beside(test, FILLED_FLAGS, notes);
                 flags.map(|flags| flags.map(|&flag| origin(flag, CellOrigin::from_filled_flag)))
             }
         };

@@ -17,10 +17,9 @@ use super::source_map::Laid;
 use super::tags::HeightMapTags;
 use crate::camera_stand::CameraStand;
 use crate::standing::ground_under;
+use crate::surface_layer::CONFIDENCE;
 use job::files::FileError;
 
-/// Name of the confidence that a DSM run writes beside its surface model.
-const CONFIDENCE: &str = "confidence.tif";
 /// Percentiles of the heights that the colours of the picture span.
 const COLOURS: (f64, f64) = (1.0, 99.0);
 
