@@ -2,9 +2,9 @@
 
 usage: places.py BINARY --before BINARY --scenes FOLDER [--shared ../shared]
 
-FOLDER gets the scenes of SEEDS that it lacks, from the simulator of shared/tools (2 to 12 minutes each). Kinds: `random` places, `dense`
-quarters (blocks of 14 m, 95 % built, houses of 8 to 21 m) and `weak` texture (0.22). The seeds of BLIND were stated before their results
-were looked at; constants were chosen with the others in view. Writes benches/results/places.json and places.md.
+FOLDER gets the scenes that it lacks, from the simulator of shared/tools, with images of 448 pixels on a side (2 minutes each). Kinds:
+`random` places, `dense` quarters (blocks of 14 m, 95 % built, houses of 8 to 21 m) and `weak` texture (0.22). The seeds of BLIND were
+stated before their results were looked at; constants were chosen with the others in view. Writes benches/results/places.json and places.md.
 
 Each reference cell is compared with the nearest cell of the surface, after a shift in x and y that the surface of BEFORE chose by its NMAD
 and a shift in z by the median. Needs numpy, rasterio, pyproj, and scipy for the simulator.
@@ -22,8 +22,9 @@ import rasterio
 from pyproj import Transformer
 
 KINDS = {"random": {}, "dense": {"block": 14.0, "density": 0.95, "bh": (8.0, 21.0)}, "weak": {"texture": 0.22}}
-SEEN = {"random": [9004], "dense": [9711, 9712], "weak": [9821]}
-BLIND = {"random": [9801, 9802, 9803], "dense": [9811]}
+SEEN = {"random": [9851, 9855, 9863, 9871, 9878], "dense": [9901, 9902, 9903], "weak": [9904, 9905, 9906]}
+BLIND = {"random": [9852, 9854, 9859, 9861, 9874, 9876], "dense": [9911, 9912, 9913, 9921, 9924, 9927, 9930, 9931]}
+SIDE_PX = 448
 ROOT = Path(__file__).resolve().parents[2]
 
 
@@ -32,7 +33,7 @@ def make_scene(tools, kind, seed, folder):
     scenes = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(scenes)
     drawn = scenes.random_scene
-    scenes.random_scene = lambda number: {**drawn(number), **KINDS[kind]}
+    scenes.random_scene = lambda number: {**drawn(number), **KINDS[kind], "size": SIDE_PX}
     scenes.main(f"random:{seed}", str(folder))
 
 

@@ -325,6 +325,10 @@ pub struct SurfaceReport {
     /// Number of those of them that lie under a mask or outside the area.
     #[serde(default)]
     pub masked: usize,
+    /// Number of filled cells between roofs, in quarters of which hardly any ground is known: their
+    /// ground is that under the lowest heights around.
+    #[serde(default)]
+    pub streets: usize,
     /// Number of cells removed as speckle.
     pub speckle_removed: usize,
     /// Share of each view's pixels with which another view agrees.

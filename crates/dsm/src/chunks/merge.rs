@@ -21,6 +21,9 @@ use job::error_text::with_causes;
 /// Below this share of observed cells a warning is given. Good scenes of towers, forest and seasons
 /// have 0.5 to 0.9, and images that do not belong together seldom more than this.
 const OBSERVED_WEAK: f64 = 0.25;
+/// From this share of cells on a warning says that streets were filled without their ground: less
+/// is hardly seen in a surface.
+const STREETS_WEAK: f64 = 0.01;
 
 /// Last stage of a run: the files that were written, and the report.
 #[derive(Debug, Clone)]
@@ -142,6 +145,7 @@ impl<'a> Merger<'a> {
             return Err(self.error.unwrap_or(DsmError::NoSurface { range: plan.height_range }));
         }
         warn_of_share(plan, &self.counts, &mut self.notes);
+        warn_of_streets(plan, &self.counts, &mut self.notes);
         warn_of_shadows(plan, &self.counts, &mut self.notes);
         let prior = plan.config.prior.clone().map(|model| self.findings.report(model, &mut self.notes));
         self.progress.begin("writing", 1);
@@ -235,6 +239,20 @@ fn doubt_of_share(cells: usize, counts: &SurfaceCounts) -> Option<String> {
     })
 }
 
+/// Warns when streets were filled without their ground.
+fn warn_of_streets(plan: &Plan, counts: &SurfaceCounts, notes: &mut Notes<'_>) {
+    let (columns, rows) = plan.grid.size;
+    let share = counts.streets as f64 / (columns * rows).max(1) as f64;
+    if share >= STREETS_WEAK {
+        notes.warn(format!(
+            "{:.0} % of the cells lie between roofs in quarters of which hardly any ground was seen; they were filled \
+             with the ground under the lowest heights around, which may be off by metres; source.tif has 5 there: {}",
+            100.0 * share,
+            image_names(plan)
+        ));
+    }
+}
+
 /// Returns the files of the images in the order in which they were given.
 fn image_names(plan: &Plan) -> String {
     let mut images: Vec<_> = plan.images.iter().collect();
@@ -266,6 +284,7 @@ fn surface_report(plan: &Plan, counts: &SurfaceCounts) -> SurfaceReport {
         filled: counts.filled,
         void: counts.void,
         masked: counts.masked,
+        streets: counts.streets,
         speckle_removed: counts.speckle_removed,
         kept_by_view: kept_by_image.iter().copied().flatten().collect(),
         kept_by_image,

@@ -9,7 +9,7 @@ use sweep::fusion::{
     CellSource, FillConfig, FillRule, FusedSurface, GridSight, KnownVoids, TrendConfig, TrustConfig, calibrate,
     fill_voids, ground_trend, occlusion_bounds, remove_speckle, surroundings,
 };
-use terrain::{GroundConfig, bare_ground_of_observed};
+use terrain::{GroundConfig, bare_ground_of_observed, goes_through_roofs};
 
 use crate::config::Fill;
 
@@ -115,11 +115,18 @@ pub(crate) fn clean_up(
     };
     let above = |height_m: &Grid<f32>| combined(height_m, &trend, |height_m, ground_m| height_m - ground_m);
     let (mut above_m, completed) = (above(&fused.height_m), above(&completed));
-    let ground = match voids.fill {
-        Fill::None => trusted.map(|_| f32::NAN),
-        _ => above(&ground_under(&fused.height_m, &trusted, gsd_m)),
+    let (ground_m, only_roofs) = match voids.fill {
+        Fill::None => (trusted.map(|_| f32::NAN), trusted.map(|_| false)),
+        _ => ground_under(&fused.height_m, &trusted, &trend, gsd_m),
     };
-    let known = KnownVoids { trusted: &trusted, blind: voids.blind, completed_m: &completed, ground_m: &ground };
+    let ground = above(&ground_m);
+    let known = KnownVoids {
+        trusted: &trusted,
+        blind: voids.blind,
+        completed_m: &completed,
+        ground_m: &ground,
+        only_roofs: &only_roofs,
+    };
     let filled = fill_voids(&mut above_m, known, bounds, &fill_config(voids.fill, gsd_m));
     for i in (0..above_m.data().len()).filter(|i| filled.source.data()[*i].is_filled()) {
         fused.height_m.data_mut()[i] = above_m.data()[i] + trend.data()[i];
@@ -131,17 +138,22 @@ pub(crate) fn clean_up(
     (filled.source, before - observed)
 }
 
-/// Returns the ground under the trusted heights, metres; NaN far from any.
+/// Returns the ground under the trusted heights, metres, NaN far from any, and the quarters of
+/// which hardly any ground is known: the trend is their ground.
 ///
-/// It tells how low a void may be. Voids are filled relative to the trend all the same: that is
-/// even, and the ground repeats the noise of the heights that it goes through.
-fn ground_under(height_m: &Grid<f32>, trusted: &Grid<bool>, gsd_m: f64) -> Grid<f32> {
+/// The ground tells how low a void may be. Voids are filled relative to the trend all the same:
+/// that is even, and the ground repeats the noise of the heights that it goes through.
+fn ground_under(height_m: &Grid<f32>, trusted: &Grid<bool>, trend: &Grid<f32>, gsd_m: f64) -> (Grid<f32>, Grid<bool>) {
     let mut seen = height_m.clone();
     let doubted = seen.data_mut().iter_mut().zip(trusted.data()).filter(|(_, is_trusted)| !**is_trusted);
     doubted.for_each(|(height, _)| *height = f32::NAN);
     let unobserved = seen.map(|h| h.is_nan());
     let found = bare_ground_of_observed(&seen, Some(&unobserved), gsd_m, &GroundConfig::default(), &Silent);
-    found.expect("the cells and the default settings are valid, and nothing cancels").heights
+    let mut ground_m = found.expect("the cells and the default settings are valid, and nothing cancels").heights;
+    let only_roofs = goes_through_roofs(&ground_m, height_m, trend, gsd_m);
+    let cells = ground_m.data_mut().iter_mut().zip(trend.data()).zip(only_roofs.data());
+    cells.filter(|(_, only_roofs)| **only_roofs).for_each(|((ground_m, trend_m), _)| *ground_m = *trend_m);
+    (ground_m, only_roofs)
 }
 
 /// Returns the values that `of` makes of two grids of one size, cell by cell.
@@ -216,4 +228,64 @@ fn known(height_m: &Grid<f32>, core: Window) -> usize {
     let columns = core.x as usize..core.x as usize + core.width;
     let row = |y: usize| height_m.row(core.y as usize + y)[columns.clone()].iter().filter(|h| !h.is_nan()).count();
     (0..core.height).map(row).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A quarter of 240 × 240 m: houses of 9 × 9 m in squares of 15 m, whose roofs stand 8 to 20 m
+    /// above the ground. `is_ground_seen` tells by column and row of a square whether its street is
+    /// observed.
+    fn quarter(is_ground_seen: impl Fn(usize, usize) -> bool) -> FusedSurface {
+        let mut height_m = Grid::filled(240, 240, f32::NAN);
+        for row in 0..240 {
+            for (column, height) in height_m.row_mut(row).iter_mut().enumerate() {
+                let (x, y) = (column / 15, row / 15);
+                if column % 15 < 9 && row % 15 < 9 {
+                    *height = 8.0 + ((x * 73_856 + y * 19_349) % 97 % 13) as f32;
+                } else if is_ground_seen(x, y) {
+                    *height = 0.0;
+                }
+            }
+        }
+        let known = |value: f32| height_m.map(|h| if h.is_nan() { 0.0 } else { value });
+        FusedSurface {
+            single_m: height_m.clone(),
+            sigma_m: height_m.map(|h| if h.is_nan() { f32::NAN } else { 0.05 }),
+            views: known(3.0).map(|views| *views as u8),
+            confidence: known(0.8),
+            seen: height_m.map(|h| !h.is_nan()),
+            height_m,
+        }
+    }
+
+    /// Cleans the surface as two views see it, and returns the sources and heights of all cells
+    /// between houses that had none.
+    fn streets(mut fused: FusedSurface) -> Vec<(CellSource, f32)> {
+        let is_void = fused.height_m.map(|h| h.is_nan());
+        let blind = is_void.map(|_| false);
+        let (images, gaps) = (is_void.map(|_| true), blind.clone());
+        let sight = |lean: f64| GridSight { cells_per_m: [lean, 0.0], images: images.clone(), gaps: gaps.clone() };
+        let voids = Voids { blind: &blind, sights: &[sight(0.1), sight(-0.1)], fill: Fill::Justified };
+        let lengths = Lengths { gsd_m: 1.0, step_m: 0.4, camera_m: 0.1 };
+        let (source, _) = clean_up(&mut fused, voids, lengths, Window::whole(240, 240));
+        let cells = source.data().iter().copied().zip(fused.height_m.data().iter().copied());
+        cells.zip(is_void.data()).filter(|(_, is_void)| **is_void).map(|(cell, _)| cell).collect()
+    }
+
+    #[test]
+    fn streets_of_which_hardly_any_is_seen_get_the_ground_and_say_so() {
+        let found = streets(quarter(|x, y| x % 6 < 2 && y % 6 < 2));
+        let right = found.iter().filter(|(_, height_m)| height_m.abs() < 1.5).count();
+        assert!(right * 10 > found.len() * 6, "{right} of {}", found.len());
+        let marked = found.iter().filter(|(source, _)| *source == CellSource::FilledStreet).count();
+        assert!(marked * 10 > found.len() * 7, "{marked} of {}", found.len());
+    }
+
+    #[test]
+    fn streets_beside_known_ones_are_filled_by_the_other_rules() {
+        let found = streets(quarter(|x, y| x % 8 != 2 || y % 8 != 2));
+        assert!(found.iter().all(|(source, _)| *source != CellSource::FilledStreet));
+    }
 }

@@ -65,6 +65,9 @@ pub struct SurfaceCounts {
     /// Those of them that lie under a mask or outside the area.
     #[serde(default)]
     pub masked: usize,
+    /// Filled cells between roofs, in quarters of which hardly any ground is known.
+    #[serde(default)]
+    pub streets: usize,
     /// Cells removed as speckle.
     pub speckle_removed: usize,
     /// Pixels by view; no pixels for a view without heights of its own.
@@ -94,6 +97,7 @@ impl SurfaceCounts {
             filled: count(&rasters.filled, FILLED),
             void: count(&rasters.filled, VOID),
             masked: count(&rasters.source, CellSource::Masked.code()),
+            streets: count(&rasters.source, CellSource::FilledStreet.code()),
             speckle_removed: 0,
             views: Vec::new(),
         }
@@ -105,6 +109,7 @@ impl SurfaceCounts {
         self.filled += other.filled;
         self.void += other.void;
         self.masked += other.masked;
+        self.streets += other.streets;
         self.speckle_removed = self.speckle_removed.saturating_add(other.speckle_removed);
         self.views.resize(self.views.len().max(other.views.len()), KeptPixels::default());
         for (own, theirs) in self.views.iter_mut().zip(&other.views) {

@@ -72,7 +72,7 @@ const BANDS: [(&str, SpoolBand<'static>); 6] = [
     ("source.tif", SpoolBand { description: SOURCE_CODES, is_float: false, no_data: 0.0 }),
 ];
 /// Description of the codes of [`sweep::fusion::CellSource`].
-const SOURCE_CODES: &str = "0_outside_1_observed_2_filled_hidden_3_filled_surface_4_filled_narrow_\
+const SOURCE_CODES: &str = "0_outside_1_observed_2_filled_hidden_3_filled_surface_4_filled_narrow_5_filled_street_\
                             10_void_unmatched_11_void_blank_12_void_hidden_13_void_masked";
 
 /// Returns the contents of the rasters in the order of [`BANDS`]; `heights` come from

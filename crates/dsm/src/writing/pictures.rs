@@ -230,6 +230,7 @@ pub fn source_legend() -> Legend {
         code(CellSource::FilledHidden, [86, 140, 200], "filled: hidden ground"),
         code(CellSource::FilledSurface, [240, 200, 80], "filled: surface that does not match"),
         code(CellSource::FilledNarrow, [150, 205, 225], "filled: narrow gap"),
+        code(CellSource::FilledStreet, [170, 130, 200], "filled: street between roofs"),
         code(CellSource::Unmatched, [200, 90, 60], "void: no match"),
         code(CellSource::Blank, [120, 90, 70], "void: one grey value"),
         code(CellSource::Hidden, [70, 70, 110], "void: hidden"),
@@ -263,6 +264,6 @@ mod tests {
         let mut colours: Vec<[u8; 3]> = codes.iter().map(|(_, colour, _)| *colour).collect();
         colours.sort_unstable();
         colours.dedup();
-        assert_eq!(colours.len(), 8);
+        assert_eq!(colours.len(), 9);
     }
 }

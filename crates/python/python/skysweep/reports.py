@@ -4339,6 +4339,10 @@ class SurfaceReport(Report):
     masked: int
     """Number of those of them that lie under a mask or outside the area."""
 
+    streets: int
+    """Number of filled cells between roofs, in quarters of which hardly any ground is known:
+    their ground is that under the lowest heights around."""
+
     speckle_removed: int
     """Number of cells removed as speckle."""
 

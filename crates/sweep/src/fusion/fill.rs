@@ -17,7 +17,8 @@
 //!   blank, unless the views agree there on a roof whose rim was seen.
 //! - Where the ground is known, it takes the place of what lies near it or below it, of what is
 //!   hidden under a surface a storey higher, and of a surface that two views would have seen.
-//!   Narrow gaps between two such surfaces keep theirs.
+//!   Narrow gaps between two such surfaces keep theirs, but not in a dense quarter of which hardly
+//!   any ground is known: there they are the streets.
 //! - What fewer than two views image is outside and stays open, unless it is narrow.
 //!
 //! Small islands of heights may be chance, so that nothing is filled from them. Trusted ones are
@@ -48,6 +49,9 @@ pub enum CellSource {
     FilledSurface = 3,
     /// Filled: a narrow gap that two views see.
     FilledNarrow = 4,
+    /// Filled: between roofs, in a quarter of which hardly any ground is known. The ground under
+    /// the lowest heights around.
+    FilledStreet = 5,
     /// Void: two views see it and do not match: change, water, too little texture.
     Unmatched = 10,
     /// Void: the images have a single grey value there.
@@ -68,7 +72,7 @@ impl CellSource {
     /// Returns whether the cell was filled.
     #[must_use]
     pub const fn is_filled(self) -> bool {
-        matches!(self, Self::FilledHidden | Self::FilledSurface | Self::FilledNarrow)
+        matches!(self, Self::FilledHidden | Self::FilledSurface | Self::FilledNarrow | Self::FilledStreet)
     }
 }
 
@@ -150,6 +154,8 @@ pub struct KnownVoids<'a> {
     pub completed_m: &'a Grid<f32>,
     /// The ground, metres; NaN where it is not known.
     pub ground_m: &'a Grid<f32>,
+    /// Whether a cell lies in a dense quarter of which roofs are known and hardly any ground.
+    pub only_roofs: &'a Grid<bool>,
 }
 
 /// Fills voids of `height_m` in place. `bound_m` returns the greatest height at which each void
@@ -161,7 +167,7 @@ pub fn fill_voids(
     bound_m: impl Fn(&Grid<f32>, &[usize]) -> Vec<f32>,
     config: &FillConfig,
 ) -> FilledVoids {
-    let KnownVoids { trusted, blind, completed_m, ground_m } = known;
+    let KnownVoids { trusted, blind, completed_m, ground_m, only_roofs } = known;
     let (width, height) = (height_m.width(), height_m.height());
     let voids: Vec<usize> = (0..height_m.data().len()).filter(|&i| height_m.data()[i].is_nan()).collect();
     let mut source = Grid::filled(width, height, CellSource::Observed);
@@ -193,6 +199,7 @@ pub fn fill_voids(
         beside_blind,
         completed_m,
         ground_m,
+        only_roofs,
         config,
     };
     let cells = voids.par_iter().zip(bounds.par_iter().zip(&around));
@@ -264,6 +271,7 @@ struct Filling<'a> {
     beside_blind: Grid<bool>,
     completed_m: &'a Grid<f32>,
     ground_m: &'a Grid<f32>,
+    only_roofs: &'a Grid<bool>,
     config: &'a FillConfig,
 }
 
@@ -285,8 +293,10 @@ impl Filling<'_> {
         // ground may be further away than the walls.
         let may_be_far = may_be_hidden && !is_under && !is_narrow && plane.is_none() && bound_m > f32::NEG_INFINITY;
         let ground_m = self.ground_m.data()[index];
-        // Between two surfaces above the ground, a narrow void is a gap in one of them.
-        let is_gap = is_narrow && around.is_enclosed_by(|k| k.height_m > ground_m + STOREY_M);
+        // Between two surfaces above the ground, a narrow void is a gap in one of them. Where all
+        // that is known are roofs, it is the street between them.
+        let may_be_street = self.only_roofs.data()[index];
+        let is_gap = is_narrow && !may_be_street && around.is_enclosed_by(|k| k.height_m > ground_m + STOREY_M);
         let lowered = |surface: Estimate| {
             let is_above = !is_gap && surface.height_m > ground_m + STOREY_M;
             if is_above { surface.at(ground_m) } else { surface }
@@ -321,7 +331,7 @@ impl Filling<'_> {
                 None => {
                     let surface = below().unwrap_or(lower.estimate);
                     let would_be_seen = bound_m > f32::NEG_INFINITY && lower.base_m > bound_m;
-                    if would_be_seen { lowered(surface) } else { surface }
+                    if would_be_seen || may_be_street { lowered(surface) } else { surface }
                 }
             })
         };
@@ -338,7 +348,12 @@ impl Filling<'_> {
         };
         let on_ground = |filled: &Estimate| filled.height_m < ground_m + ON_GROUND_M;
         let estimate = estimate.map(|filled| if on_ground(&filled) { filled.at(ground_m) } else { filled });
-        Judged { source: if estimate.is_some() { source } else { open }, estimate }
+        let source = match estimate {
+            Some(filled) if may_be_street && filled.height_m == ground_m => CellSource::FilledStreet,
+            Some(_) => source,
+            None => open,
+        };
+        Judged { source, estimate }
     }
 
     /// Returns the lower of the surfaces around a cell and the height that continues it into the

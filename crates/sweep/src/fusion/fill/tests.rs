@@ -15,11 +15,38 @@ const CONFIG: FillConfig = FillConfig {
     sigma_slope_m: 0.1,
 };
 
+/// What is known about the voids of a surface.
+struct About {
+    trusted: Grid<bool>,
+    blind: Grid<bool>,
+    completed_m: Grid<f32>,
+    ground_m: Grid<f32>,
+    only_roofs: Grid<bool>,
+}
+
+impl About {
+    /// Trusts all heights, and knows nothing else.
+    fn surface(height_m: &Grid<f32>) -> Self {
+        let (nowhere, unknown) = (height_m.map(|_| false), height_m.map(|_| f32::NAN));
+        Self {
+            trusted: height_m.map(|_| true),
+            blind: nowhere.clone(),
+            completed_m: unknown.clone(),
+            ground_m: unknown,
+            only_roofs: nowhere,
+        }
+    }
+
+    /// Fills the voids; two views see past the surface above `bound_m`.
+    fn fill(&self, height_m: &mut Grid<f32>, bound_m: f32, config: &FillConfig) -> FilledVoids {
+        let Self { trusted, blind, completed_m, ground_m, only_roofs } = self;
+        let known = KnownVoids { trusted, blind, completed_m, ground_m, only_roofs };
+        fill_voids(height_m, known, |_, voids| vec![bound_m; voids.len()], config)
+    }
+}
+
 fn fill_with(height_m: &mut Grid<f32>, bound_m: f32, config: &FillConfig) -> FilledVoids {
-    let blind = Grid::filled(height_m.width(), height_m.height(), false);
-    let (trusted, nowhere) = (blind.map(|_| true), blind.map(|_| f32::NAN));
-    let known = KnownVoids { trusted: &trusted, blind: &blind, completed_m: &nowhere, ground_m: &nowhere };
-    fill_voids(height_m, known, |_, voids| vec![bound_m; voids.len()], config)
+    About::surface(height_m).fill(height_m, bound_m, config)
 }
 
 /// Fills with two views that see every void.
@@ -89,14 +116,12 @@ fn blank_images_leave_a_wide_void_open_and_say_so() {
     let (mut seen, mut unseen) = (void_in_a_plain(), void_in_a_plain());
     fill(&mut seen);
     assert!((10..20).all(|x| (10..20).all(|y| seen[(x, y)] == 1.0)), "{:?}", seen.row(15));
-    let visible = |_: &Grid<f32>, voids: &[usize]| vec![f32::NEG_INFINITY; voids.len()];
-    let (trusted, nowhere) = (blind.map(|_| true), blind.map(|_| f32::NAN));
-    let known = KnownVoids { trusted: &trusted, blind: &blind, completed_m: &nowhere, ground_m: &nowhere };
-    let found = fill_voids(&mut unseen, known, visible, &CONFIG);
+    let about = About { blind, ..About::surface(&unseen) };
+    let found = about.fill(&mut unseen, f32::NEG_INFINITY, &CONFIG);
     assert!((12..20).all(|x| unseen[(x, 15)].is_nan()) && unseen[(10, 15)] == 1.0, "{:?}", unseen.row(15));
     assert_eq!(found.source[(15, 15)], CellSource::Blank);
     let everything = FillConfig { rule: FillRule::Everything, ..CONFIG };
-    fill_voids(&mut unseen, known, visible, &everything);
+    about.fill(&mut unseen, f32::NEG_INFINITY, &everything);
     assert!((10..20).all(|x| (10..20).all(|y| unseen[(x, y)] == 1.0)), "{:?}", unseen.row(15));
 }
 
@@ -107,15 +132,12 @@ fn a_blank_roof_is_completed_where_its_rim_was_seen_and_blank_ground_is_not() {
     (5..25).for_each(|x| (5..25).for_each(|y| roof[(x, y)] = 6.0));
     (10..20).for_each(|x| (10..20).for_each(|y| roof[(x, y)] = f32::NAN));
     (30..36).for_each(|x| (30..36).for_each(|y| roof[(x, y)] = f32::NAN));
-    let (blind, trusted) = (roof.map(|h| h.is_nan()), roof.map(|_| true));
-    let nowhere = roof.map(|_| f32::NAN);
     for (at, height_m, is_completed) in [((15, 15), 6.4, true), ((15, 15), 16.0, false), ((33, 33), 1.0, false)] {
-        let mut completed_m = roof.map(|_| f32::NAN);
-        completed_m[at] = height_m;
-        let known = KnownVoids { trusted: &trusted, blind: &blind, completed_m: &completed_m, ground_m: &nowhere };
+        let mut about = About { blind: roof.map(|h| h.is_nan()), ..About::surface(&roof) };
+        about.completed_m[at] = height_m;
         let mut filled = roof.clone();
         let config = FillConfig { narrow_cells: 3.0, ..CONFIG };
-        let found = fill_voids(&mut filled, known, |_, voids| vec![f32::NEG_INFINITY; voids.len()], &config);
+        let found = about.fill(&mut filled, f32::NEG_INFINITY, &config);
         assert_eq!(filled[at] == height_m, is_completed, "{height_m}");
         assert_eq!(found.source[at] == CellSource::FilledSurface, is_completed, "{height_m}");
     }
@@ -148,12 +170,8 @@ fn a_void_of_a_blank_roof_is_not_taken_for_hidden_ground() {
     let mut g = Grid::filled(60, 60, -20.0f32);
     (10..50).for_each(|x| (10..50).for_each(|y| g[(x, y)] = 16.0));
     (14..46).for_each(|x| (14..60).for_each(|y| g[(x, y)] = if y < 50 { f32::NAN } else { -20.0 }));
-    let trusted = g.map(|_| true);
-    let nowhere = g.map(|_| f32::NAN);
     let filled = |blind: Grid<bool>| {
-        let known = KnownVoids { trusted: &trusted, blind: &blind, completed_m: &nowhere, ground_m: &nowhere };
-        let mut filled = g.clone();
-        let source = fill_voids(&mut filled, known, |_, voids| vec![10.0; voids.len()], &CONFIG).source;
+        let source = About { blind, ..About::surface(&g) }.fill(&mut g.clone(), 10.0, &CONFIG).source;
         let is_hidden = |i: usize| source.data()[i] == CellSource::FilledHidden;
         let inside = (14..46).flat_map(|x| (14..46).map(move |y| y * 60 + x));
         (inside.filter(|i| is_hidden(*i)).count(), source[(30, 30)])
@@ -174,11 +192,9 @@ fn a_small_island_in_a_void_is_kept_and_spread_only_where_it_is_trusted_and_not_
     (18..22).for_each(|x| (18..22).for_each(|y| surface[(x, y)] = 9.0));
     let filled = |is_trusted: bool, trusted_island_cells: usize| {
         let mut g = surface.clone();
-        let trusted = g.map(|h| *h == 1.0 || is_trusted);
-        let (blind, nowhere) = (g.map(|_| false), g.map(|_| f32::NAN));
-        let known = KnownVoids { trusted: &trusted, blind: &blind, completed_m: &nowhere, ground_m: &nowhere };
+        let about = About { trusted: g.map(|h| *h == 1.0 || is_trusted), ..About::surface(&g) };
         let config = FillConfig { trusted_island_cells, ..CONFIG };
-        let found = fill_voids(&mut g, known, |_, voids| vec![f32::NEG_INFINITY; voids.len()], &config);
+        let found = about.fill(&mut g, f32::NEG_INFINITY, &config);
         assert!((18..22).all(|x| (18..22).all(|y| found.source[(x, y)] == CellSource::Observed && g[(x, y)] == 9.0)));
         (14..18).filter(|x| found.source[(*x, 20)].is_filled()).count()
     };
@@ -187,29 +203,53 @@ fn a_small_island_in_a_void_is_kept_and_spread_only_where_it_is_trusted_and_not_
 
 /// A void between the roofs of two rows of houses, every other one of which is 6 m higher, and
 /// the ground under it.
-#[test]
-fn ground_fills_a_street_that_two_views_would_have_seen_and_no_narrow_gap_of_a_roof() {
-    let filled = |width: usize, roofs_m: [f32; 2], ground_m: f32, bound_m: f32| {
+struct Street {
+    width: usize,
+    roofs_m: [f32; 2],
+    ground_m: f32,
+    bound_m: f32,
+    only_roofs: bool,
+}
+
+impl Street {
+    /// Returns the height in the middle of the void, and its source.
+    fn filled(&self) -> (f32, CellSource) {
         let mut height_m = Grid::filled(60, 40, 0.0);
         for y in 0..40 {
             let higher_m = if y / 10 % 2 == 0 { 0.0 } else { 6.0 };
             let row = height_m.row_mut(y);
-            row[..20].fill(roofs_m[0] + higher_m);
-            row[20 + width..].fill(roofs_m[1] - higher_m);
-            row[20..20 + width].fill(f32::NAN);
+            row[..20].fill(self.roofs_m[0] + higher_m);
+            row[20 + self.width..].fill(self.roofs_m[1] - higher_m);
+            row[20..20 + self.width].fill(f32::NAN);
         }
-        let blind = height_m.map(|_| false);
-        let (trusted, completed_m) = (blind.map(|_| true), blind.map(|_| f32::NAN));
-        let ground_m = blind.map(|_| ground_m);
-        let known = KnownVoids { trusted: &trusted, blind: &blind, completed_m: &completed_m, ground_m: &ground_m };
-        let config = FillConfig { reach_cells: 20, ..CONFIG };
-        let found = fill_voids(&mut height_m, known, |_, voids| vec![bound_m; voids.len()], &config);
-        (height_m[(20 + width / 2, 20)], found.source[(20 + width / 2, 20)])
-    };
-    let unknown = f32::NAN;
-    assert_eq!(filled(14, [20.0, 27.0], 2.0, 10.0), (2.0, CellSource::FilledSurface));
-    assert!(filled(14, [20.0, 27.0], unknown, 10.0).0 >= 14.0);
-    assert_eq!(filled(14, [20.0, 27.0], 2.0, 30.0), (2.0, CellSource::FilledHidden));
-    assert!(filled(4, [20.0, 26.0], 2.0, 10.0).0 >= 20.0);
-    assert_eq!(filled(4, [-9.0, 1.0], 2.0, f32::NEG_INFINITY).0, 2.0);
+        let ground_m = height_m.map(|_| self.ground_m);
+        let only_roofs = height_m.map(|_| self.only_roofs);
+        let about = About { ground_m, only_roofs, ..About::surface(&height_m) };
+        let found = about.fill(&mut height_m, self.bound_m, &FillConfig { reach_cells: 20, ..CONFIG });
+        (height_m[(20 + self.width / 2, 20)], found.source[(20 + self.width / 2, 20)])
+    }
+}
+
+const WIDE_STREET: Street =
+    Street { width: 14, roofs_m: [20.0, 27.0], ground_m: 2.0, bound_m: 10.0, only_roofs: false };
+const NARROW_STREET: Street = Street { width: 4, roofs_m: [20.0, 26.0], ..WIDE_STREET };
+
+#[test]
+fn ground_fills_a_street_that_two_views_would_have_seen_and_no_narrow_gap_of_a_roof() {
+    assert_eq!(WIDE_STREET.filled(), (2.0, CellSource::FilledSurface));
+    assert!(Street { ground_m: f32::NAN, ..WIDE_STREET }.filled().0 >= 14.0);
+    assert_eq!(Street { bound_m: 30.0, ..WIDE_STREET }.filled(), (2.0, CellSource::FilledHidden));
+    assert!(NARROW_STREET.filled().0 >= 20.0);
+    assert_eq!(Street { roofs_m: [-9.0, 1.0], bound_m: f32::NEG_INFINITY, ..NARROW_STREET }.filled().0, 2.0);
+}
+
+#[test]
+fn a_narrow_void_is_a_street_where_roofs_are_all_that_is_known() {
+    for bound_m in [10.0, 30.0, f32::NEG_INFINITY] {
+        let street = Street { bound_m, only_roofs: true, ..NARROW_STREET };
+        assert_eq!(street.filled(), (2.0, CellSource::FilledStreet));
+    }
+    // What stands less than a storey above the ground of the quarter may be a yard.
+    let yard = Street { roofs_m: [4.0, 10.5], bound_m: f32::NEG_INFINITY, only_roofs: true, ..NARROW_STREET };
+    assert_eq!(yard.filled().1, CellSource::FilledNarrow);
 }

@@ -1,0 +1,105 @@
+//! Ground that goes through roofs.
+//!
+//! In a dense quarter whose streets do not match, hardly anything but roofs is known. The search
+//! for objects then takes houses for ground, as nothing lower lies within its windows. Such a
+//! ground gives itself away: houses are of different heights, so it is rough, and it lies above the
+//! lowest heights of the quarter.
+
+use raster::Grid;
+
+use crate::coarse::{blocks, blurred, difference, weighted_blocks};
+use crate::forest::roughness;
+use crate::membrane::filled;
+use crate::objects::STOREY_M;
+use crate::regions::Regions;
+
+/// Side of the blocks that are compared, metres: half of a small house.
+const BLOCK_M: f64 = 5.0;
+/// Half-width of the surroundings that a ground is judged in, metres: a few houses to each side.
+const SURROUNDINGS_M: f64 = 30.0;
+
+/// Least share of voids in such a quarter: the streets and yards of the densest quarters take more.
+const VOID_SHARE: f32 = 0.3;
+
+/// Returns where the ground that was found in a surface with cells of `cell_m` metres goes through
+/// roofs: in parts with many voids that lie more than a storey above `lower`, a trend under the
+/// lowest heights around, and deviate from the planes around by more than half a storey. Real
+/// ground is smoother between its voids.
+///
+/// All three are in metres. Voids of the surface, and places without ground, are NaN.
+///
+/// ```
+/// use raster::Grid;
+/// use terrain::goes_through_roofs;
+///
+/// // Roofs of 9, 13 and 17 m, with a void between each two of them.
+/// let roof = |i: usize| if i % 10 < 6 { 9.0 + 4.0 * (i % 90 / 10 % 3) as f32 } else { f32::NAN };
+/// let roofs = Grid::from_vec(90, 90, (0..8100).map(roof).collect()).unwrap();
+/// let level = |height_m: f32| roofs.map(|_| height_m);
+/// assert!(goes_through_roofs(&roofs, &roofs, &level(1.0), 1.0)[(45, 45)]);
+/// assert!(!goes_through_roofs(&level(9.0), &roofs, &level(1.0), 1.0)[(45, 45)]);
+/// ```
+#[must_use]
+pub fn goes_through_roofs(ground: &Grid<f32>, surface: &Grid<f32>, lower: &Grid<f32>, cell_m: f64) -> Grid<bool> {
+    let side = ((BLOCK_M / cell_m).round() as usize).max(1);
+    let radius = (SURROUNDINGS_M / (cell_m * side as f64)).round() as usize;
+    let coarse = filled(&blocks(ground, side));
+    let above = blurred(&difference(&coarse, &blocks(lower, side)), radius);
+    let rough = roughness(&coarse, radius);
+    let (_, known) = weighted_blocks(surface, side, |_| 1.0);
+    let parts = Regions::of(&above.map(|above_m| *above_m > STOREY_M));
+    let is_through = |part| {
+        let median = |of: &Grid<f32>| parts.median(part, |block| of.data()[block]);
+        let cells = parts.cells(part);
+        let known_share = cells.iter().map(|&block| known.data()[block as usize]).sum::<f32>() / cells.len() as f32;
+        known_share < 1.0 - VOID_SHARE && median(&rough).is_some_and(|rough_m| rough_m > 0.5 * STOREY_M)
+    };
+    let through = parts.mask(is_through);
+    let mut out = ground.map(|_| false);
+    for row in 0..out.height() {
+        let blocks = through.row(row / side);
+        out.row_mut(row).iter_mut().enumerate().for_each(|(column, out)| *out = blocks[column / side]);
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Houses of 8 × 8 m in squares of 14 m, whose roofs stand 6 to 20 m above a slope of 20 %.
+    fn quarter(between: impl Fn(f32) -> f32) -> (Grid<f32>, Grid<f32>) {
+        let slope = Grid::from_vec(180, 180, (0..180 * 180).map(|i| 0.2 * (i % 180) as f32).collect()).unwrap();
+        let mut surface = slope.clone();
+        for row in 0..180 {
+            for (column, height) in surface.row_mut(row).iter_mut().enumerate() {
+                let is_roof = column % 14 < 8 && row % 14 < 8;
+                let roof_m = 6.0 + ((column / 14 * 5 + row / 14 * 3) % 8) as f32 * 2.0;
+                *height = if is_roof { *height + roof_m } else { between(*height) };
+            }
+        }
+        (slope, surface)
+    }
+
+    #[test]
+    fn roofs_of_many_heights_between_voids_are_no_ground() {
+        let (slope, surface) = quarter(|_| f32::NAN);
+        let through = goes_through_roofs(&filled(&surface), &surface, &slope, 1.0);
+        assert!(through.data().iter().all(|is| *is));
+        // The slope itself, and a trend that is too low under a hill.
+        assert!(!goes_through_roofs(&slope, &surface, &slope, 1.0).data().contains(&true));
+        assert!(!goes_through_roofs(&slope, &surface, &slope.map(|h| h - 9.0), 1.0).data().contains(&true));
+    }
+
+    #[test]
+    fn a_surface_without_voids_shows_what_its_ground_is() {
+        let (slope, surface) = quarter(|height| height);
+        assert!(!goes_through_roofs(&surface, &surface, &slope, 1.0).data().contains(&true));
+    }
+
+    #[test]
+    fn unknown_ground_goes_through_nothing() {
+        let unknown = Grid::filled(40, 30, f32::NAN);
+        assert!(!goes_through_roofs(&unknown, &unknown, &unknown.map(|_| 0.0), 1.0).data().contains(&true));
+    }
+}
