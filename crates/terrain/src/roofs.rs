@@ -17,14 +17,16 @@ use crate::regions::Regions;
 const BLOCK_M: f64 = 5.0;
 /// Half-width of the surroundings that a ground is judged in, metres: a few houses to each side.
 const SURROUNDINGS_M: f64 = 30.0;
-
 /// Least share of voids in such a quarter: the streets and yards of the densest quarters take more.
 const VOID_SHARE: f32 = 0.3;
+/// Least share of blocks with heights near the trend, within twice the surroundings: an eighth of
+/// the streets. Without them the trend lies under a few wrong heights, or comes from far away.
+const GROUND_SHARE: f32 = 0.05;
 
 /// Returns where the ground that was found in a surface with cells of `cell_m` metres goes through
 /// roofs: in parts with many voids that lie more than a storey above `lower`, a trend under the
 /// lowest heights around, and deviate from the planes around by more than half a storey. Real
-/// ground is smoother between its voids.
+/// ground is smoother between its voids. Some heights of the surface must lie at the trend.
 ///
 /// All three are in metres. Voids of the surface, and places without ground, are NaN.
 ///
@@ -32,8 +34,12 @@ const VOID_SHARE: f32 = 0.3;
 /// use raster::Grid;
 /// use terrain::goes_through_roofs;
 ///
-/// // Roofs of 9, 13 and 17 m, with a void between each two of them.
-/// let roof = |i: usize| if i % 10 < 6 { 9.0 + 4.0 * (i % 90 / 10 % 3) as f32 } else { f32::NAN };
+/// // Roofs of 9, 13 and 17 m, with a void between each two of them, and a street.
+/// let roof = |i: usize| match i % 90 {
+///     20..30 => 1.0,
+///     column if column % 10 < 6 => 9.0 + 4.0 * (column / 10 % 3) as f32,
+///     _ => f32::NAN,
+/// };
 /// let roofs = Grid::from_vec(90, 90, (0..8100).map(roof).collect()).unwrap();
 /// let level = |height_m: f32| roofs.map(|_| height_m);
 /// assert!(goes_through_roofs(&roofs, &roofs, &level(1.0), 1.0)[(45, 45)]);
@@ -44,10 +50,16 @@ pub fn goes_through_roofs(ground: &Grid<f32>, surface: &Grid<f32>, lower: &Grid<
     let side = ((BLOCK_M / cell_m).round() as usize).max(1);
     let radius = (SURROUNDINGS_M / (cell_m * side as f64)).round() as usize;
     let coarse = filled(&blocks(ground, side));
-    let above = blurred(&difference(&coarse, &blocks(lower, side)), radius);
+    let lower = blocks(lower, side);
+    let above = blurred(&difference(&coarse, &lower), radius);
     let rough = roughness(&coarse, radius);
     let (_, known) = weighted_blocks(surface, side, |_| 1.0);
-    let parts = Regions::of(&above.map(|above_m| *above_m > STOREY_M));
+    let is_at_lower = |above_m: &f32| if above_m.abs() < STOREY_M { 1.0 } else { 0.0 };
+    let seen = blurred(&difference(&blocks(surface, side), &lower).map(is_at_lower), 2 * radius);
+    let mut is_above = above.map(|above_m| *above_m > STOREY_M);
+    let shares = is_above.data_mut().iter_mut().zip(seen.data());
+    shares.for_each(|(is_above, share)| *is_above &= *share >= GROUND_SHARE);
+    let parts = Regions::of(&is_above);
     let is_through = |part| {
         let median = |of: &Grid<f32>| parts.median(part, |block| of.data()[block]);
         let cells = parts.cells(part);
@@ -67,15 +79,20 @@ pub fn goes_through_roofs(ground: &Grid<f32>, surface: &Grid<f32>, lower: &Grid<
 mod tests {
     use super::*;
 
-    /// Houses of 8 × 8 m in squares of 14 m, whose roofs stand 6 to 20 m above a slope of 20 %.
+    /// Houses of 8 × 8 m in squares of 14 m, whose roofs stand 6 to 20 m above a slope of 20 %. One
+    /// in nine squares is a yard.
     fn quarter(between: impl Fn(f32) -> f32) -> (Grid<f32>, Grid<f32>) {
         let slope = Grid::from_vec(180, 180, (0..180 * 180).map(|i| 0.2 * (i % 180) as f32).collect()).unwrap();
         let mut surface = slope.clone();
         for row in 0..180 {
             for (column, height) in surface.row_mut(row).iter_mut().enumerate() {
-                let is_roof = column % 14 < 8 && row % 14 < 8;
-                let roof_m = 6.0 + ((column / 14 * 5 + row / 14 * 3) % 8) as f32 * 2.0;
-                *height = if is_roof { *height + roof_m } else { between(*height) };
+                let (x, y) = (column / 14, row / 14);
+                let roof_m = 6.0 + ((x * 5 + y * 3) % 8) as f32 * 2.0;
+                *height = match (x % 3 == 1 && y % 3 == 1, column % 14 < 8 && row % 14 < 8) {
+                    (true, _) => *height,
+                    (_, true) => *height + roof_m,
+                    _ => between(*height),
+                };
             }
         }
         (slope, surface)
@@ -86,9 +103,11 @@ mod tests {
         let (slope, surface) = quarter(|_| f32::NAN);
         let through = goes_through_roofs(&filled(&surface), &surface, &slope, 1.0);
         assert!(through.data().iter().all(|is| *is));
-        // The slope itself, and a trend that is too low under a hill.
+        // A trend that no height bears out, the slope itself, and a trend too low under a hill.
+        let deep = slope.map(|h| h - 9.0);
+        assert!(!goes_through_roofs(&filled(&surface), &surface, &deep, 1.0).data().contains(&true));
         assert!(!goes_through_roofs(&slope, &surface, &slope, 1.0).data().contains(&true));
-        assert!(!goes_through_roofs(&slope, &surface, &slope.map(|h| h - 9.0), 1.0).data().contains(&true));
+        assert!(!goes_through_roofs(&slope, &slope, &deep, 1.0).data().contains(&true));
     }
 
     #[test]

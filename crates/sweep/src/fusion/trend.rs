@@ -32,9 +32,6 @@ const ABOVE_WEIGHT: f64 = 0.03;
 const STOREY_M: f64 = 3.0;
 /// Rounds of reweighting, after which the plane moves by centimetres only.
 const ROUNDS: usize = 12;
-/// Number of times that planes are fitted, each time to what lies above the last ones. On a slope
-/// the low height of a block lies downhill, and above the first planes it does not.
-const PASSES: usize = 2;
 /// A slope needs this many blocks. With fewer the trend is level.
 const BLOCKS_MIN: usize = 12;
 
@@ -53,19 +50,6 @@ const BLOCKS_MIN: usize = 12;
 /// ```
 #[must_use]
 pub fn ground_trend(height_m: &Grid<f32>, trusted: &Grid<bool>, config: &TrendConfig) -> Grid<f32> {
-    let mut trend = planes_under(height_m, trusted, config);
-    for _ in 1..PASSES {
-        let mut above_m = height_m.clone();
-        above_m.data_mut().iter_mut().zip(trend.data()).for_each(|(height_m, trend_m)| *height_m -= trend_m);
-        let rest = planes_under(&above_m, trusted, config);
-        trend.data_mut().iter_mut().zip(rest.data()).for_each(|(trend_m, rest_m)| *trend_m += rest_m);
-    }
-    trend
-}
-
-/// Returns the planes under the low heights of blocks, interpolated between the blocks; 0 without
-/// any height.
-fn planes_under(height_m: &Grid<f32>, trusted: &Grid<bool>, config: &TrendConfig) -> Grid<f32> {
     let (width, height) = (height_m.width(), height_m.height());
     let block = config.block_cells.max(1);
     let (columns, rows) = (width.div_ceil(block), height.div_ceil(block));
