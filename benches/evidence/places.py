@@ -4,7 +4,8 @@ usage: places.py BINARY --before BINARY --scenes FOLDER [--shared ../shared]
 
 FOLDER gets the scenes that it lacks, from the simulator of shared/tools, with images of 448 pixels on a side (2 minutes each). Kinds:
 `random` places, `dense` quarters (blocks of 14 m, 95 % built, houses of 8 to 21 m) and `weak` texture (0.22). The seeds of BLIND were
-stated before their results were looked at; constants were chosen with the others in view. Writes benches/results/places.json and places.md.
+stated before their results were looked at; constants were chosen with the others in view. Writes benches/results/places.json and places.md,
+and the hillshades of one quarter, exact, before and now, to docs/figures/only_roofs.png.
 
 Each reference cell is compared with the nearest cell of the surface, after a shift in x and y that the surface of BEFORE chose by its NMAD
 and a shift in z by the median. Needs numpy, rasterio, pyproj, and scipy for the simulator.
@@ -25,6 +26,7 @@ KINDS = {"random": {}, "dense": {"block": 14.0, "density": 0.95, "bh": (8.0, 21.
 SEEN = {"random": [9851, 9855, 9863, 9871, 9878], "dense": [9901, 9902, 9903, 9921, 9930], "weak": [9904, 9905, 9906]}
 BLIND = {"random": [9852, 9854, 9859, 9861, 9874, 9876], "dense": [9911, 9912, 9913, 9924, 9927, 9931]}
 SIDE_PX = 448
+PICTURED = "dense 9903"
 ROOT = Path(__file__).resolve().parents[2]
 
 
@@ -117,6 +119,23 @@ def measure(reference, folder, cpu_s, limit_m):
     }
 
 
+def shaded(heights, cell_m):
+    """A hillshade with the light from the north-west; places without a height are black."""
+    down, right = np.gradient(heights, cell_m)
+    light = (1.0 - right - down) / np.sqrt(3.0 * (1.0 + right**2 + down**2))
+    return np.nan_to_num(255.0 * np.clip(light, 0.1, 1.0)).astype(np.uint8)
+
+
+def picture(surfaces, cell_m, path):
+    """Surfaces side by side."""
+    parts = [shaded(surfaces[0], cell_m)]
+    for surface in surfaces[1:]:
+        parts += [np.full((surface.shape[0], 8), 255, np.uint8), shaded(surface, cell_m)]
+    image = np.hstack(parts)
+    with rasterio.open(path, "w", driver="PNG", height=image.shape[0], width=image.shape[1], count=1, dtype="uint8") as out:
+        out.write(image, 1)
+
+
 def places(shared, scenes):
     """Name, images, reference, options and limit of "right" of each place."""
     data = shared / "data"
@@ -175,10 +194,16 @@ def main():
     results = {}
     for name, images, truth, options, limit_m in places(given.shared, given.scenes):
         reference, both = Reference(truth), {}
+        surfaces = [reference.heights]
         for label, binary in (("before", given.before), ("now", given.binary)):
             folder = given.scenes / "runs" / label
             cpu_s = run(binary, images, options, folder)
             both[label] = measure(reference, folder, cpu_s, limit_m)
+            if name == PICTURED:
+                surface, transform, crs = read(folder / "dsm" / "dsm.tif")
+                surfaces.append(reference.nearest(surface, transform, crs, reference.shift))
+        if name == PICTURED:
+            picture(surfaces, reference.transform.a, ROOT / "docs" / "figures" / "only_roofs.png")
         results[name] = both
         print(name, both, flush=True)
     out = ROOT / "benches" / "results"
