@@ -9,6 +9,7 @@ use raster::Grid;
 
 use crate::coarse::{blocks, blurred, difference, weighted_blocks};
 use crate::forest::roughness;
+use crate::ground::{RISE_M, work_side};
 use crate::membrane::filled;
 use crate::objects::STOREY_M;
 use crate::regions::Regions;
@@ -17,6 +18,8 @@ use crate::regions::Regions;
 const BLOCK_M: f64 = 5.0;
 /// Half-width of the surroundings that a ground is judged in, metres: a few houses to each side.
 const SURROUNDINGS_M: f64 = 30.0;
+/// Half-width of the planes that tell roofs from crowns, metres.
+const ROOF_HALF_WIDTH_M: f64 = 2.0;
 /// Least share of voids in such a quarter: the streets and yards of the densest quarters take more.
 const VOID_SHARE: f32 = 0.3;
 /// Least share of blocks with heights near the trend, within twice the surroundings: an eighth of
@@ -26,7 +29,8 @@ const GROUND_SHARE: f32 = 0.05;
 /// Returns where the ground that was found in a surface with cells of `cell_m` metres goes through
 /// roofs: in parts with many voids that lie more than a storey above `lower`, a trend under the
 /// lowest heights around, and deviate from the planes around by more than half a storey. Real
-/// ground is smoother between its voids. Some heights of the surface must lie at the trend.
+/// ground is smoother between its voids. Some heights of the surface must lie at the trend, and the
+/// others must be as even as roofs are: between crowns there are crowns.
 ///
 /// All three are in metres. Voids of the surface, and places without ground, are NaN.
 ///
@@ -59,12 +63,18 @@ pub fn goes_through_roofs(ground: &Grid<f32>, surface: &Grid<f32>, lower: &Grid<
     let mut is_above = above.map(|above_m| *above_m > STOREY_M);
     let shares = is_above.data_mut().iter_mut().zip(seen.data());
     shares.for_each(|(is_above, share)| *is_above &= *share >= GROUND_SHARE);
+    let fine = work_side(cell_m);
+    let fine_m = cell_m * fine as f64;
+    let uneven = roughness(&blocks(surface, fine), ((ROOF_HALF_WIDTH_M / fine_m).round() as usize).max(1));
+    let uneven = filled(&blocks(&uneven, (side / fine).max(1)));
     let parts = Regions::of(&is_above);
     let is_through = |part| {
         let median = |of: &Grid<f32>| parts.median(part, |block| of.data()[block]);
         let cells = parts.cells(part);
         let known_share = cells.iter().map(|&block| known.data()[block as usize]).sum::<f32>() / cells.len() as f32;
-        known_share < 1.0 - VOID_SHARE && median(&rough).is_some_and(|rough_m| rough_m > 0.5 * STOREY_M)
+        known_share < 1.0 - VOID_SHARE
+            && median(&rough).is_some_and(|rough_m| rough_m > 0.5 * STOREY_M)
+            && median(&uneven).is_some_and(|uneven_m| uneven_m < RISE_M)
     };
     let through = parts.mask(is_through);
     let mut out = ground.map(|_| false);
@@ -120,5 +130,15 @@ mod tests {
     fn unknown_ground_goes_through_nothing() {
         let unknown = Grid::filled(40, 30, f32::NAN);
         assert!(!goes_through_roofs(&unknown, &unknown, &unknown.map(|_| 0.0), 1.0).data().contains(&true));
+    }
+
+    #[test]
+    fn crowns_are_no_roofs() {
+        let (slope, mut surface) = quarter(|_| f32::NAN);
+        let is_raised: Vec<bool> = surface.data().iter().zip(slope.data()).map(|(h, ground)| h > ground).collect();
+        for (i, height) in surface.data_mut().iter_mut().enumerate().filter(|(i, _)| is_raised[*i]) {
+            *height += [0.0, 4.0, 1.5][i % 180 % 3];
+        }
+        assert!(!goes_through_roofs(&filled(&surface), &surface, &slope, 1.0).data().contains(&true));
     }
 }
