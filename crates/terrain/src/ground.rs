@@ -195,10 +195,14 @@ fn without_ramps(surface: &Grid<f32>, objects: &Grid<bool>, cell_m: f64, noise_m
     ground
 }
 
+/// Deviations of the cells of a surface from the planes around them, metres; NaN at voids.
+pub(crate) fn unevenness(surface: &Grid<f32>, cell_m: f64) -> Grid<f32> {
+    roughness(surface, ((NOISE_HALF_WIDTH_M / cell_m).round() as usize).max(1))
+}
+
 /// Noise of a surface: the deviation of its smooth cells from the planes around them, metres.
 fn noise_of(ground: &Grid<f32>, cell_m: f64) -> f64 {
-    let radius = ((NOISE_HALF_WIDTH_M / cell_m).round() as usize).max(1);
-    let rough = roughness(ground, radius);
+    let rough = unevenness(ground, cell_m);
     let mut known: Vec<f32> = rough.data().iter().copied().filter(|h| !h.is_nan()).collect();
     quantile(&mut known, SMOOTH_SHARE).map_or(NOISE_MIN_M, |noise| f64::from(noise).max(NOISE_MIN_M))
 }

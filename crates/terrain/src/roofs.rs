@@ -9,7 +9,7 @@ use raster::Grid;
 
 use crate::coarse::{blocks, blurred, difference, weighted_blocks};
 use crate::forest::roughness;
-use crate::ground::{RISE_M, work_side};
+use crate::ground::{RISE_M, unevenness, work_side};
 use crate::membrane::filled;
 use crate::objects::STOREY_M;
 use crate::regions::Regions;
@@ -18,8 +18,6 @@ use crate::regions::Regions;
 const BLOCK_M: f64 = 5.0;
 /// Half-width of the surroundings that a ground is judged in, metres: a few houses to each side.
 const SURROUNDINGS_M: f64 = 30.0;
-/// Half-width of the planes that tell roofs from crowns, metres.
-const ROOF_HALF_WIDTH_M: f64 = 2.0;
 /// Least share of voids in such a quarter: the streets and yards of the densest quarters take more.
 const VOID_SHARE: f32 = 0.3;
 /// Least share of blocks with heights near the trend, within twice the surroundings: an eighth of
@@ -51,7 +49,10 @@ const GROUND_SHARE: f32 = 0.05;
 /// ```
 #[must_use]
 pub fn goes_through_roofs(ground: &Grid<f32>, surface: &Grid<f32>, lower: &Grid<f32>, cell_m: f64) -> Grid<bool> {
-    let side = ((BLOCK_M / cell_m).round() as usize).max(1);
+    let fine = work_side(cell_m);
+    let fine_m = cell_m * fine as f64;
+    let fine_in_block = ((BLOCK_M / fine_m).round() as usize).max(1);
+    let side = fine * fine_in_block;
     let radius = (SURROUNDINGS_M / (cell_m * side as f64)).round() as usize;
     let coarse = filled(&blocks(ground, side));
     let lower = blocks(lower, side);
@@ -63,10 +64,7 @@ pub fn goes_through_roofs(ground: &Grid<f32>, surface: &Grid<f32>, lower: &Grid<
     let mut is_above = above.map(|above_m| *above_m > STOREY_M);
     let shares = is_above.data_mut().iter_mut().zip(seen.data());
     shares.for_each(|(is_above, share)| *is_above &= *share >= GROUND_SHARE);
-    let fine = work_side(cell_m);
-    let fine_m = cell_m * fine as f64;
-    let uneven = roughness(&blocks(surface, fine), ((ROOF_HALF_WIDTH_M / fine_m).round() as usize).max(1));
-    let uneven = filled(&blocks(&uneven, (side / fine).max(1)));
+    let uneven = filled(&blocks(&unevenness(&blocks(surface, fine), fine_m), fine_in_block));
     let parts = Regions::of(&is_above);
     let is_through = |part| {
         let median = |of: &Grid<f32>| parts.median(part, |block| of.data()[block]);
@@ -118,6 +116,34 @@ mod tests {
         assert!(!goes_through_roofs(&filled(&surface), &surface, &deep, 1.0).data().contains(&true));
         assert!(!goes_through_roofs(&slope, &surface, &slope, 1.0).data().contains(&true));
         assert!(!goes_through_roofs(&slope.map(|h| h + 9.0), &surface, &slope, 1.0).data().contains(&true));
+    }
+
+    /// Houses in the north, crowns in the south, and a void of 70 m between. Blocks hold whole cells
+    /// of those on which roofs are told from crowns, whatever the side of a cell.
+    #[test]
+    fn roofs_and_crowns_are_told_apart_where_they_stand() {
+        let height = |x: f64, y: f64| {
+            let (column, row) = ((x / 14.0) as usize, (y / 14.0) as usize);
+            let bump_m = if y > 200.0 { [0.0, 4.0, 1.5][(x + y) as usize % 3] } else { 0.0 };
+            match (column % 3 == 1 && row % 3 == 1, x % 14.0 < 8.0 && y % 14.0 < 8.0) {
+                (true, _) => 0.0,
+                (_, true) => 6.0 + ((column * 5 + row * 3) % 8) as f32 * 2.0 + bump_m,
+                _ => f32::NAN,
+            }
+        };
+        for cell_m in [0.3, 0.4, 0.7, 1.0] {
+            let count = (300.0 / cell_m) as usize;
+            let with_between = |between_m: f32| {
+                let places = (0..count * count).map(|i| ((i % count) as f64 * cell_m, (i / count) as f64 * cell_m));
+                let is_between = |y: f64| (180.0..250.0).contains(&y);
+                let cells = places.map(|(x, y)| if is_between(y) { between_m } else { height(x, y) });
+                Grid::from_vec(count, count, cells.collect()).unwrap()
+            };
+            let (surface, ground) = (with_between(f32::NAN), filled(&with_between(0.0)));
+            let through = goes_through_roofs(&ground, &surface, &ground.map(|_| 0.0), cell_m);
+            let row = |y: f64| through.row((y / cell_m) as usize);
+            assert!(row(20.0).iter().all(|is| *is) && !row(280.0).contains(&true), "{cell_m}");
+        }
     }
 
     #[test]
