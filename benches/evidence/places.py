@@ -16,6 +16,7 @@ import importlib.util
 import json
 import resource
 import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +29,8 @@ BLIND = {"random": [9852, 9854, 9859, 9861, 9874, 9876], "dense": [9911, 9912, 9
 SIDE_PX = 448
 PICTURED = "dense 9903"
 ROOT = Path(__file__).resolve().parents[2]
+sys.path.append(str(ROOT / "benches/common"))
+import pictures  # noqa: E402
 
 
 def make_scene(tools, kind, seed, folder):
@@ -119,23 +122,6 @@ def measure(reference, folder, cpu_s, limit_m):
     }
 
 
-def shaded(heights, cell_m):
-    """A hillshade with the light from the north-west; places without a height are black."""
-    down, right = np.gradient(heights, cell_m)
-    light = (1.0 - right - down) / np.sqrt(3.0 * (1.0 + right**2 + down**2))
-    return np.nan_to_num(255.0 * np.clip(light, 0.1, 1.0)).astype(np.uint8)
-
-
-def picture(surfaces, cell_m, path):
-    """Surfaces side by side."""
-    parts = [shaded(surfaces[0], cell_m)]
-    for surface in surfaces[1:]:
-        parts += [np.full((surface.shape[0], 8), 255, np.uint8), shaded(surface, cell_m)]
-    image = np.hstack(parts)
-    with rasterio.open(path, "w", driver="PNG", height=image.shape[0], width=image.shape[1], count=1, dtype="uint8") as out:
-        out.write(image, 1)
-
-
 def places(shared, scenes):
     """Name, images, reference, options and limit of "right" of each place."""
     data = shared / "data"
@@ -203,7 +189,8 @@ def main():
                 surface, transform, crs = read(folder / "dsm" / "dsm.tif")
                 surfaces.append(reference.nearest(surface, transform, crs, reference.shift))
         if name == PICTURED:
-            picture(surfaces, reference.transform.a, ROOT / "docs" / "figures" / "only_roofs.png")
+            parts = [pictures.hillshade(surface, reference.transform.a) for surface in surfaces]
+            pictures.side_by_side(parts, (0.0, 1.0), ROOT / "docs/figures/only_roofs.png")
         results[name] = both
         print(name, both, flush=True)
     out = ROOT / "benches" / "results"

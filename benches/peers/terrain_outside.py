@@ -18,12 +18,12 @@ import sys
 import tempfile
 
 import numpy as np
-import rasterio
 
 import dtm
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path.append(str(ROOT / "benches/peers/terrain"))
+sys.path += [str(ROOT / "benches/common"), str(ROOT / "benches/peers/terrain")]
+import pictures  # noqa: E402
 import places  # noqa: E402
 
 SHARED = places.SHARED
@@ -96,25 +96,15 @@ def scene(program, seed, work):
             f"{name}, from images, RMSE under objects, m": found["rmse_under_objects_m"]}
 
 
-def shaded(path):
-    """A hillshade of the middle of a ground, light from the north-west."""
-    ground, profile = dtm.read(path)
-    middle = tuple(slice((n - PICTURE_CELLS) // 2, (n + PICTURE_CELLS) // 2) for n in ground.shape)
-    down, right = np.gradient(ground[middle], profile["transform"].a)
-    return (1.0 + right + down) / np.sqrt(3.0 + 3.0 * (right ** 2 + down ** 2))
-
-
 def picture(programs, options, path):
-    """The ground of the first drawn place by each program, side by side."""
+    """The middle of the ground of the first drawn place by each program, side by side."""
     folder = options.work / f"scenes/r{options.seeds[0]}"
-    parts = [shaded(terrain(program, folder / "run", options.work / f"made/picture_{number}"))
-             for number, program in enumerate(programs)]
-    low, high = np.nanpercentile(parts[0], [2, 98])
-    gap = np.full((PICTURE_CELLS, 8), high)
-    image = np.hstack([parts[0], *[part for other in parts[1:] for part in (gap, other)]])
-    image = np.clip(255.0 * (image - low) / (high - low), 0, 255).astype(np.uint8)
-    with rasterio.open(path, "w", driver="PNG", height=image.shape[0], width=image.shape[1], count=1, dtype="uint8") as out:
-        out.write(image, 1)
+    parts = []
+    for number, program in enumerate(programs):
+        ground, profile = dtm.read(terrain(program, folder / "run", options.work / f"made/picture_{number}"))
+        middle = tuple(slice((n - PICTURE_CELLS) // 2, (n + PICTURE_CELLS) // 2) for n in ground.shape)
+        parts.append(pictures.hillshade(ground[middle], profile["transform"].a))
+    pictures.side_by_side(parts, np.nanpercentile(parts[0], [2, 98]), path)
 
 
 def measured(program, options):
