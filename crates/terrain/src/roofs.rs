@@ -118,8 +118,8 @@ mod tests {
         assert!(!goes_through_roofs(&slope.map(|h| h + 9.0), &surface, &slope, 1.0).data().contains(&true));
     }
 
-    /// Houses in the north, crowns in the south, and a void of 70 m between. Blocks hold whole cells
-    /// of those on which roofs are told from crowns, whatever the side of a cell.
+    /// Houses in the north, crowns in the south, and a void of 70 m between. Blocks hold whole
+    /// cells of those on which roofs are told from crowns, whatever the side of a cell.
     #[test]
     fn roofs_and_crowns_are_told_apart_where_they_stand() {
         let height = |x: f64, y: f64| {
