@@ -7,6 +7,7 @@ use city::{CityModel, Defect};
 use super::error::{CityError, CityFault};
 use super::format::{CityFormat, Parsed};
 use super::{citygml, cityjson, obj, ply};
+use io::ply::looks_like_ply;
 use io::read_regular;
 
 /// Largest file that is read, bytes.
@@ -61,7 +62,7 @@ pub fn read(path: &Path) -> Result<CityFile, CityError> {
 
 fn parse(bytes: &[u8]) -> Result<Parsed, CityFault> {
     let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
-    if ply::looks_like(bytes) {
+    if looks_like_ply(bytes) {
         return ply::parse(bytes);
     }
     match text.first() {

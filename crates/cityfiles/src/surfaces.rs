@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 use city::{MeshConfig, ObjectStatus, TriangleMesh};
 use crs::{CrsIdentity, VerticalDatum};
 
+use io::ply::looks_like_ply;
 use io::points::{PointCloud, is_point_cloud};
 use io::splat_ply::LocalOrigin;
 use io::{FormatError, open_regular};
@@ -56,13 +57,9 @@ pub fn is_surface(path: impl AsRef<Path>) -> bool {
         Some(b'{') => true,
         // A raster may be XML too (VRT).
         Some(b'<') => matches!(&*extension, "gml" | "xml" | "citygml"),
-        Some(_) => extension == "obj" || is_ply(first),
+        Some(_) => extension == "obj" || looks_like_ply(first),
         None => false,
     }
-}
-
-fn is_ply(bytes: &[u8]) -> bool {
-    bytes.starts_with(b"ply\n") || bytes.starts_with(b"ply\r")
 }
 
 /// Reads a surface. `config` selects the objects and the levels of detail of a city model.
@@ -76,7 +73,7 @@ pub fn read(path: impl AsRef<Path>, config: &MeshConfig) -> Result<SurfaceFile, 
         return cloud(path);
     }
     let bytes = crate::content(path)?;
-    if is_ply(&bytes) {
+    if looks_like_ply(&bytes) {
         return ply(path, &bytes, config);
     }
     drop(bytes);
@@ -111,9 +108,8 @@ fn ply(path: &Path, bytes: &[u8], config: &MeshConfig) -> Result<SurfaceFile, Fo
         let format = "PLY point cloud".to_owned();
         SurfaceFile { path: path.to_owned(), format, positions: points.positions, ..SurfaceFile::empty() }
     };
-    let comment = |key: &str| points.comments.iter().find_map(|line| line.strip_prefix(key)).map(str::trim);
-    let commented =
-        comment("origin ").and_then(numbers).map(|origin| (origin, comment("crs ").map(str::to_owned), None));
+    let crs = || points.header.crs().map(str::to_owned);
+    let commented = points.header.origin().map(|origin| (origin, crs(), None));
     let beside = || -> Result<_, FormatError> {
         let found = LocalOrigin::read_beside(path)?;
         Ok(found.map(|found| (found.origin, Some(found.crs), found.vertical.parse().ok())))
@@ -132,12 +128,6 @@ fn ply(path: &Path, bytes: &[u8], config: &MeshConfig) -> Result<SurfaceFile, Fo
         surface.notes.push(format!("the origin {origin:?} was added to its positions: {}", path.display()));
     }
     Ok(surface)
-}
-
-/// Parses three finite numbers.
-fn numbers(text: &str) -> Option<[f64; 3]> {
-    let numbers: Vec<f64> = text.split_whitespace().map(str::parse).collect::<Result<_, _>>().ok()?;
-    <[f64; 3]>::try_from(numbers).ok().filter(|origin| origin.iter().all(|c| c.is_finite()))
 }
 
 /// Reads a city model or mesh as triangles.

@@ -10,6 +10,7 @@ use serde_json::{Value, json};
 
 use crate::atomic::{SaveError, write_stream};
 use crate::gltf::{Glb, GlbBuffers};
+use crate::ply::write_header;
 
 /// A mesh with a colour at every corner.
 #[derive(Debug, Clone)]
@@ -33,15 +34,13 @@ pub struct ColouredMesh<'a> {
 pub fn write_mesh_ply(path: &Path, mesh: &ColouredMesh<'_>, overwrite: bool) -> Result<(), SaveError> {
     let [x, y, z] = mesh.origin;
     let crs = mesh.crs.filter(|crs| !crs.contains(|c: char| c.is_control() || !c.is_ascii()));
+    let comments = [format!("origin {x} {y} {z}")].into_iter().chain(crs.map(|crs| format!("crs {crs}")));
+    let comments: Vec<String> = comments.collect();
+    let corner = ["float x", "float y", "float z", "uchar red", "uchar green", "uchar blue"];
+    let elements: [(&str, usize, &[&str]); 2] =
+        [("vertex", mesh.positions.len(), &corner), ("face", mesh.triangles.len(), &["list uchar int vertex_indices"])];
     write_stream(path, overwrite, |out| {
-        writeln!(out, "ply\nformat binary_little_endian 1.0\ncomment origin {x} {y} {z}")?;
-        if let Some(crs) = crs {
-            writeln!(out, "comment crs {crs}")?;
-        }
-        writeln!(out, "element vertex {}", mesh.positions.len())?;
-        writeln!(out, "property float x\nproperty float y\nproperty float z")?;
-        writeln!(out, "property uchar red\nproperty uchar green\nproperty uchar blue")?;
-        writeln!(out, "element face {}\nproperty list uchar int vertex_indices\nend_header", mesh.triangles.len())?;
+        write_header(out, &comments, &elements)?;
         for (position, colour) in mesh.positions.iter().zip(mesh.colours) {
             position.iter().try_for_each(|c| out.write_all(&c.to_le_bytes()))?;
             out.write_all(&colour.map(|c| (255.0 * c.clamp(0.0, 1.0)).round() as u8))?;

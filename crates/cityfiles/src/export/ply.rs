@@ -2,19 +2,17 @@
 
 use std::io::Write;
 
-use super::source::{Export, line};
+use io::ply::write_header;
+
+use super::source::Export;
 
 pub(super) fn write(out: &mut dyn Write, export: &Export<'_>) -> std::io::Result<()> {
     let mesh = export.mesh;
-    line(out, format_args!("ply\nformat binary_little_endian 1.0"))?;
-    for remark in export.remarks() {
-        line(out, format_args!("comment {remark}"))?;
-    }
-    line(out, format_args!("element vertex {}", mesh.positions.len()))?;
-    line(out, format_args!("property float x\nproperty float y\nproperty float z"))?;
-    line(out, format_args!("element face {}", mesh.triangles.len()))?;
-    line(out, format_args!("property list uchar int vertex_indices\nproperty uchar class\nproperty int object"))?;
-    line(out, format_args!("end_header"))?;
+    let elements: [(&str, usize, &[&str]); 2] = [
+        ("vertex", mesh.positions.len(), &["float x", "float y", "float z"]),
+        ("face", mesh.triangles.len(), &["list uchar int vertex_indices", "uchar class", "int object"]),
+    ];
+    write_header(out, &export.remarks(), &elements)?;
     for position in &mesh.positions {
         for coordinate in position {
             out.write_all(&(*coordinate as f32).to_le_bytes())?;

@@ -1,7 +1,6 @@
 //! Reads splats. Properties are found by name, so that files of other programs can be read. Unknown
 //! ones are skipped.
 
-use std::collections::HashMap;
 use std::path::Path;
 
 use gaussian::{Splat, SplatHarmonics, SplatLabel};
@@ -10,12 +9,11 @@ use super::labels::{LabelTable, SplatLabels};
 use super::layout::{SH_C0, SH_DEGREE_MAX, SplatForm, SplatLayout};
 use super::origin::LocalOrigin;
 use crate::format_error::FormatError;
+use crate::ply::{PlyElement, PlyEncoding, PlyHeader, PlyNumber, PlyProperty};
 use crate::regular::read_regular;
 
 /// Largest file that is read, bytes.
 const SIZE_LIMIT: u64 = 16 << 30;
-/// Longest header that is searched for its end, bytes.
-const HEADER_LIMIT: usize = 1 << 20;
 /// Thickness of a disc as a fraction of its smaller scale.
 const DISC_THICKNESS: f32 = 1e-3;
 /// Greatest thickness of a disc in a file with three scales, as a fraction of its smaller scale.
@@ -61,29 +59,6 @@ impl SplatFile {
     }
 }
 
-/// The header of a file.
-struct Header {
-    /// Number of splats.
-    count: u64,
-    /// The float properties by name.
-    floats: HashMap<String, Column>,
-    /// Byte offsets of class and object in a row, where they have the types of labels.
-    labels: [Option<usize>; 2],
-    /// Size of a row, bytes.
-    row: usize,
-    /// Byte offset of the first row.
-    body: usize,
-}
-
-/// Place of a number within a row.
-#[derive(Debug, Clone, Copy)]
-struct Column {
-    /// Byte offset in the row.
-    at: usize,
-    /// Size in bytes: 4 or 8.
-    size: usize,
-}
-
 /// Reads the splats of a file, and the origin beside it.
 ///
 /// # Errors
@@ -115,23 +90,34 @@ struct Column {
 /// ```
 pub fn read(path: &Path) -> Result<SplatFile, FormatError> {
     let bytes = read_regular(path, SIZE_LIMIT).map_err(|source| FormatError::unreadable(path, "the file", source))?;
-    let header = header(&bytes).map_err(|what| FormatError::new(path, what))?;
-    let room = (bytes.len() - header.body) / header.row.max(1);
-    if header.row == 0 || header.count > room as u64 {
-        let what = format!("the header announces {} splats, the file has room for {room}", header.count);
-        return Err(FormatError::new(path, what));
+    let refused = |what: String| FormatError::new(path, what);
+    let header = PlyHeader::parse(&bytes).map_err(|fault| FormatError::new(path, fault))?;
+    if header.encoding != PlyEncoding::LittleEndian {
+        return Err(refused("the format of the PLY is not binary_little_endian, which splats have".to_owned()));
     }
-    let columns = Columns::of(&header).map_err(|what| FormatError::new(path, what))?;
-    let rows = bytes[header.body..].chunks_exact(header.row).take(header.count as usize);
-    let mut splats = Vec::with_capacity(header.count as usize);
+    let vertices = header.elements.first().filter(|element| element.name == "vertex");
+    let vertices =
+        vertices.ok_or_else(|| refused("the file does not begin with its vertices, as splats do".to_owned()))?;
+    let size = vertices
+        .record_bytes()
+        .ok_or_else(|| refused("a vertex has a list property, expected numbers only".to_owned()))?;
+    let room = (bytes.len() - header.end) / size.max(1);
+    if size == 0 || vertices.count > room as u64 {
+        return Err(refused(format!("the header announces {} splats, the file has room for {room}", vertices.count)));
+    }
+    let count = vertices.count as usize;
+    let columns = Columns::of(vertices).map_err(refused)?;
+    let rows = bytes[header.end..].chunks_exact(size).take(count);
+    let mut splats = Vec::with_capacity(count);
     let mut coefficients: Vec<f32> = Vec::new();
-    let mut labels: Option<Vec<SplatLabel>> = columns.labels.map(|_| Vec::with_capacity(header.count as usize));
+    let mut labels: Option<Vec<SplatLabel>> = columns.labels.map(|_| Vec::with_capacity(count));
     for (index, row) in rows.enumerate() {
         let splat = columns.splat(row);
         splat.validate().map_err(|defect| FormatError::new(path, format!("splat {index}: {defect}")))?;
         splats.push(splat);
         if let (Some(labels), Some(places)) = (&mut labels, columns.labels) {
-            labels.push(label(row, places));
+            let [class, object] = places.map(|place| value(row, place));
+            labels.push(SplatLabel { class: class as u8, object: object as u32 });
         }
         coefficients.extend(columns.rest.iter().map(|&column| value(row, column) as f32));
     }
@@ -147,80 +133,12 @@ pub fn read(path: &Path) -> Result<SplatFile, FormatError> {
     Ok(SplatFile { splats, harmonics, labels, layout: columns.layout, origin: LocalOrigin::read_beside(path)? })
 }
 
-fn header(bytes: &[u8]) -> Result<Header, String> {
-    let text = &bytes[..bytes.len().min(HEADER_LIMIT)];
-    let mark = b"end_header\n";
-    let end = text.windows(mark.len()).position(|w| w == mark).ok_or("the file has no PLY header")?;
-    let text = std::str::from_utf8(&text[..end]).map_err(|_| "the PLY header is not text")?;
-    let mut lines = text.lines();
-    if lines.next().map(str::trim) != Some("ply") {
-        return Err("the file does not begin with \"ply\"".to_owned());
-    }
-    let body = end + mark.len();
-    let mut header = Header { count: 0, floats: HashMap::new(), labels: [None; 2], row: 0, body };
-    let (mut binary, mut element) = (false, None);
-    for line in lines {
-        let words: Vec<&str> = line.split_whitespace().collect();
-        match words[..] {
-            ["format", name, _] => binary = name == "binary_little_endian",
-            ["element", name, count] => {
-                if element.is_none() {
-                    header.count = count
-                        .parse()
-                        .map_err(|_| format!("the number of elements is {count:?}, expected a whole number"))?;
-                    element = Some(name == "vertex");
-                } else {
-                    element = Some(false);
-                }
-            }
-            ["property", kind, name] if element == Some(true) => header.property(kind, name)?,
-            ["property", ..] if element == Some(true) => {
-                return Err("a vertex has a list property, expected numbers only".to_owned());
-            }
-            _ => {}
-        }
-    }
-    if !binary {
-        return Err("the format of the PLY is not binary_little_endian, which splats have".to_owned());
-    }
-    Ok(header)
-}
-
-impl Header {
-    fn property(&mut self, kind: &str, name: &str) -> Result<(), String> {
-        let size = match kind {
-            "char" | "uchar" | "int8" | "uint8" => 1,
-            "short" | "ushort" | "int16" | "uint16" => 2,
-            "int" | "uint" | "int32" | "uint32" | "float" | "float32" => 4,
-            "double" | "float64" => 8,
-            _ => return Err(format!("{kind:?} is not a PLY type")),
-        };
-        if matches!(kind, "float" | "float32" | "double" | "float64") {
-            self.floats.insert(name.to_owned(), Column { at: self.row, size });
-        }
-        match (kind, name) {
-            ("uchar" | "uint8", "class") => self.labels[0] = Some(self.row),
-            ("uint" | "uint32", "object") => self.labels[1] = Some(self.row),
-            _ => {}
-        }
-        self.row += size;
-        Ok(())
-    }
-}
+/// Byte offset and type of a number within a row.
+type Column = (usize, PlyNumber);
 
 /// Returns a number of a row.
-fn value(row: &[u8], Column { at, size }: Column) -> f64 {
-    match row[at..at + size] {
-        [a, b, c, d] => f64::from(f32::from_le_bytes([a, b, c, d])),
-        [a, b, c, d, e, f, g, h] => f64::from_le_bytes([a, b, c, d, e, f, g, h]),
-        _ => f64::NAN,
-    }
-}
-
-/// Returns the label of a row, given the places of its class and object.
-fn label(row: &[u8], [class, object]: [usize; 2]) -> SplatLabel {
-    let [a, b, c, d] = [0, 1, 2, 3].map(|i| row[object + i]);
-    SplatLabel { class: row[class], object: u32::from_le_bytes([a, b, c, d]) }
+fn value(row: &[u8], (at, number): Column) -> f64 {
+    number.value(&row[at..])
 }
 
 /// Places of the numbers of a splat within a row.
@@ -232,21 +150,23 @@ struct Columns {
     rotation: [Column; 4],
     /// The harmonics beyond the constant one.
     rest: Vec<Column>,
-    /// Byte offsets of class and object, where there are both.
-    labels: Option<[usize; 2]>,
+    /// Class and object, where there are both with the types of labels.
+    labels: Option<[Column; 2]>,
     layout: SplatLayout,
 }
 
 impl Columns {
-    fn of(header: &Header) -> Result<Self, String> {
+    fn of(vertices: &PlyElement) -> Result<Self, String> {
         let column = |name: &str| {
             let missing = || format!("the vertices have no float property {name:?}, so this is not a file of splats");
-            header.floats.get(name).copied().ok_or_else(missing)
+            vertices.column(name).filter(|(_, number)| number.is_float()).ok_or_else(missing)
         };
+        let label = |name: &str, kind: PlyNumber| vertices.column(name).filter(|(_, number)| *number == kind);
         let numbered = |name: &str, i: usize| column(&format!("{name}_{i}"));
         let (first, second) = (numbered("scale", 0)?, numbered("scale", 1)?);
         let third = numbered("scale", 2).ok();
-        let rest = header.floats.keys().filter(|name| name.starts_with("f_rest_")).count();
+        let is_rest = |property: &&PlyProperty| property.name.starts_with("f_rest_") && property.value.is_float();
+        let rest = vertices.properties.iter().filter(is_rest).count();
         let degree = (0..=SH_DEGREE_MAX)
             .find(|&sh_degree| SplatLayout { sh_degree, ..SplatLayout::default() }.rest() == rest)
             .ok_or_else(|| {
@@ -255,7 +175,9 @@ impl Columns {
         let rest = (0..rest).map(|i| numbered("f_rest", i)).collect::<Result<Vec<Column>, String>>()?;
         Ok(Self {
             rest,
-            labels: header.labels[0].zip(header.labels[1]).map(|(class, object)| [class, object]),
+            labels: label("class", PlyNumber::U8)
+                .zip(label("object", PlyNumber::U32))
+                .map(|(class, object)| [class, object]),
             position: [column("x")?, column("y")?, column("z")?],
             colour: [numbered("f_dc", 0)?, numbered("f_dc", 1)?, numbered("f_dc", 2)?],
             opacity: column("opacity")?,

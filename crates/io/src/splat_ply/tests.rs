@@ -175,7 +175,7 @@ fn files_that_are_no_splats_are_refused_with_the_reason() {
         let error = read(&path).unwrap_err().to_string();
         assert!(error.contains(words), "{error}");
     };
-    refused(b"", "has no PLY header");
+    refused(b"", "does not begin with \"ply\"");
     refused(b"ply\nformat ascii 1.0\nelement vertex 0\nend_header\n", "binary_little_endian");
     refused(b"ply\nformat binary_little_endian 1.0\nelement vertex 0\nproperty float x\nend_header\n", "\"scale_0\"");
     refused(

@@ -10,6 +10,7 @@ use super::origin::LocalOrigin;
 use super::read::SplatFile;
 use crate::atomic::{refuse_existing, write_stream};
 use crate::format_error::FormatError;
+use crate::ply::write_header;
 
 /// Writes splats, and their origin beside them. Harmonics beyond the constant one are 0.
 ///
@@ -78,14 +79,12 @@ fn body(
     labels: Option<&[SplatLabel]>,
     layout: SplatLayout,
 ) -> std::io::Result<()> {
-    writeln!(out, "ply\nformat binary_little_endian 1.0\nelement vertex {}", splats.len())?;
-    for name in layout.properties() {
-        writeln!(out, "property float {name}")?;
-    }
+    let mut properties: Vec<String> = layout.properties().into_iter().map(|name| format!("float {name}")).collect();
     if labels.is_some() {
-        writeln!(out, "property uchar class\nproperty uint object")?;
+        properties.extend(["uchar class", "uint object"].map(str::to_owned));
     }
-    writeln!(out, "end_header")?;
+    let properties: Vec<&str> = properties.iter().map(String::as_str).collect();
+    write_header(out, &[], &[("vertex", splats.len(), &properties)])?;
     let mut row: Vec<u8> = Vec::new();
     for (number, splat) in splats.iter().enumerate() {
         row.clear();

@@ -6,8 +6,8 @@
 
 use std::path::Path;
 
-use crate::atomic::SaveError;
-use crate::atomic::write_stream;
+use super::header::write_header;
+use crate::atomic::{SaveError, write_stream};
 
 /// Point with a normal and a colour.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,9 +20,8 @@ pub struct PlyPoint {
     pub color: [u8; 3],
 }
 
-const PROPERTIES: &str = "property float x\nproperty float y\nproperty float z\n\
-    property float nx\nproperty float ny\nproperty float nz\n\
-    property uchar red\nproperty uchar green\nproperty uchar blue\n";
+const PROPERTIES: [&str; 9] =
+    ["float x", "float y", "float z", "float nx", "float ny", "float nz", "uchar red", "uchar green", "uchar blue"];
 
 /// Writes points, and one comment line per entry of `comments` (`origin x y z`, `crs …`).
 ///
@@ -49,12 +48,7 @@ pub fn write_points(
 ) -> Result<(), SaveError> {
     write_stream(path.as_ref(), overwrite, |out| {
         let count = points.len();
-        writeln!(out, "ply\nformat binary_little_endian 1.0")?;
-        for comment in comments {
-            let line: String = comment.chars().filter(|c| c.is_ascii() && !c.is_control()).collect();
-            writeln!(out, "comment {line}")?;
-        }
-        write!(out, "element vertex {count}\n{PROPERTIES}end_header\n")?;
+        write_header(out, comments, &[("vertex", count, &PROPERTIES)])?;
         let mut written = 0;
         for point in points {
             let mut record = [0u8; 27];
