@@ -24,8 +24,8 @@ import rasterio
 from pyproj import Transformer
 
 KINDS = {"random": {}, "dense": {"block": 14.0, "density": 0.95, "bh": (8.0, 21.0)}, "weak": {"texture": 0.22}}
-SEEN = {"random": [9851, 9855, 9863, 9871, 9878], "dense": [9901, 9902, 9903, 9921, 9930], "weak": [9904, 9905, 9906]}
-BLIND = {"random": [9852, 9854, 9859, 9861, 9874, 9876], "dense": [9911, 9912, 9913, 9924, 9927, 9931]}
+SEEN = {"random": [9851, 9855, 9863, 9871, 9878], "dense": [9901, 9902, 9903, 9921, 9930, 9931], "weak": [9904, 9905, 9906]}
+BLIND = {"random": [9852, 9854, 9859, 9861, 9874, 9876], "dense": [9911, 9912, 9913, 9924, 9927]}
 SIDE_PX = 448
 PICTURED = "dense 9903"
 ROOT = Path(__file__).resolve().parents[2]
