@@ -93,10 +93,10 @@ impl Regions {
         self.numbers.data()[cell as usize] as usize - 1
     }
 
-    /// The median over the cells of a region.
+    /// The median over the cells of a region that have a value.
     pub(crate) fn median(&self, region: usize, of: impl Fn(usize) -> f32) -> Option<f32> {
-        let mut values: Vec<f32> = self.cells(region).iter().map(|&cell| of(cell as usize)).collect();
-        quantile(&mut values, 0.5)
+        let values = self.cells(region).iter().map(|&cell| of(cell as usize)).filter(|value| !value.is_nan());
+        quantile(&mut values.collect::<Vec<f32>>(), 0.5)
     }
 
     /// Marks the cells of the regions that are `chosen`.

@@ -12,7 +12,7 @@ use crate::forest::roughness;
 use crate::ground::{unevenness, work_side};
 use crate::membrane::filled;
 use crate::objects::STOREY_M;
-use crate::regions::{Regions, quantile};
+use crate::regions::Regions;
 
 /// Side of the blocks that are compared, metres: half of a small house.
 const BLOCK_M: f64 = 5.0;
@@ -70,11 +70,8 @@ pub fn goes_through_roofs(ground: &Grid<f32>, surface: &Grid<f32>, lower: &Grid<
     let uneven = blocks(&unevenness(&blocks(surface, fine), fine_m), fine_in_block);
     let parts = Regions::of(&is_above);
     let is_through = |part| {
+        let median = |of: &Grid<f32>| parts.median(part, |block| of.data()[block]);
         let cells = parts.cells(part);
-        let median = |of: &Grid<f32>| {
-            let known = cells.iter().map(|&block| of.data()[block as usize]).filter(|value| !value.is_nan());
-            quantile(&mut known.collect::<Vec<f32>>(), 0.5)
-        };
         let known_share = cells.iter().map(|&block| known.data()[block as usize]).sum::<f32>() / cells.len() as f32;
         known_share < 1.0 - VOID_SHARE
             && median(&rough).is_some_and(|rough_m| rough_m > 0.5 * STOREY_M)
