@@ -273,7 +273,7 @@ pub fn write_header(
 ) -> std::io::Result<()> {
     writeln!(out, "ply\nformat binary_little_endian 1.0")?;
     for comment in comments {
-        let line: String = comment.chars().filter(|c| c.is_ascii() && !c.is_control()).collect();
+        let line: String = comment.chars().filter(|c| !c.is_control()).collect();
         writeln!(out, "comment {line}")?;
     }
     for (name, count, properties) in elements {

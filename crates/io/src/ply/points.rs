@@ -48,7 +48,9 @@ pub fn write_points(
 ) -> Result<(), SaveError> {
     write_stream(path.as_ref(), overwrite, |out| {
         let count = points.len();
-        write_header(out, comments, &[("vertex", count, &PROPERTIES)])?;
+        // Readers of trainers take the header for ASCII.
+        let comments: Vec<String> = comments.iter().map(|c| c.chars().filter(char::is_ascii).collect()).collect();
+        write_header(out, &comments, &[("vertex", count, &PROPERTIES)])?;
         let mut written = 0;
         for point in points {
             let mut record = [0u8; 27];
