@@ -259,8 +259,7 @@ def main():
     arguments.add_argument("--out", type=pathlib.Path, default=pathlib.Path("benches/results"))
     given = arguments.parse_args()
     places = []
-    for place in given.seeds:
-        following = SEEDS[(SEEDS.index(place) + 1) % len(SEEDS)] if place in SEEDS else SEEDS[0]
+    for place, following in zip(given.seeds, given.seeds[1:] + given.seeds[:1]):
         places.append(judged(given.binary, given.work, place, following))
         # Results are kept after each place.
         written(given.out, places, [])

@@ -26,4 +26,4 @@ pub use states::OrthoCounts;
 
 pub(crate) use inputs::{OrthoImage, OrthoSurface};
 pub(crate) use run::{lay, run_in_window};
-pub(crate) use view::{Cell, look};
+pub(crate) use view::{Cell, look, window_of};

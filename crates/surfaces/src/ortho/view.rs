@@ -77,7 +77,7 @@ fn sight(surface: &OcclusionSurface<'_>, eyeline: &Eyeline, cell: &Cell, toleran
 /// Reads the values of all bands at image points.
 fn values(source: &impl Pixels, places: &[Option<ImagePoint>]) -> Result<Vec<Vec<f32>>, OrthoError> {
     let bands = source.bands();
-    let Some(window) = window(places) else { return Ok(vec![vec![f32::NAN; places.len()]; bands]) };
+    let Some(window) = window_of(places) else { return Ok(vec![vec![f32::NAN; places.len()]; bands]) };
     let pixels = window.width.saturating_mul(window.height);
     if pixels > PIXELS_MAX && places.len() > 1 {
         return halves(source, places);
@@ -102,7 +102,7 @@ fn halves(source: &impl Pixels, places: &[Option<ImagePoint>]) -> Result<Vec<Vec
 }
 
 /// Returns the window of pixels that image points need; `None` without a point.
-fn window(places: &[Option<ImagePoint>]) -> Option<Window> {
+pub(crate) fn window_of(places: &[Option<ImagePoint>]) -> Option<Window> {
     let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
     for place in places.iter().flatten() {
         low = [low[0].min(place.sample), low[1].min(place.line)];

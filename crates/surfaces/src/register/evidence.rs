@@ -20,6 +20,8 @@ const PARTS: usize = 5;
 const LEAD_SIGMAS: f64 = 2.0;
 /// Least number of points for each parameter of an order.
 const POINTS_PER_PARAMETER: usize = 4;
+/// Points with which every order is tried.
+pub(super) const POINTS_FOR_ORDERS: usize = ModelOrder::Affine.parameters() * POINTS_PER_PARAMETER;
 
 /// Iterates over observed minus projected places, pixels; NaN where the camera fails.
 pub(super) fn residuals<'a>(camera: &'a RpcCamera, points: &'a [ControlPoint]) -> impl Iterator<Item = [f64; 2]> + 'a {

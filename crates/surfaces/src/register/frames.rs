@@ -6,6 +6,7 @@
 
 use std::collections::HashMap;
 
+use camera::{ImagePoint, RpcCamera};
 use geodesy::LonLatHeight;
 use occlusion::{GridGround, OcclusionSurface};
 use ortho::Sight;
@@ -103,14 +104,16 @@ impl<'a> Frames<'a> {
         self.ground.lonlat(column, row)
     }
 
-    /// Returns a cell that may be compared.
+    /// Returns whether the model holds at a cell: it was observed, and lies beside no jump.
+    fn holds(&self, at: [usize; 2]) -> bool {
+        let [column, row] = self.in_model(at.map(|at| at as f64)).map(|at| at.round() as usize);
+        let is_marked = |mask: &Grid<bool>| mask.get(column, row).is_some_and(|marked| *marked);
+        !self.unobserved.is_some_and(is_marked) && !is_marked(self.beside_jumps)
+    }
+
+    /// Returns a cell that has a height.
     fn cell(&self, at: [usize; 2]) -> Option<Cell> {
         let [column, row] = self.in_model(at.map(|at| at as f64));
-        let nearest = (column.round() as usize, row.round() as usize);
-        let is_marked = |mask: &Grid<bool>| mask.get(nearest.0, nearest.1).is_some_and(|marked| *marked);
-        if self.unobserved.is_some_and(is_marked) || is_marked(self.beside_jumps) {
-            return None;
-        }
         let height = self.surface.height_at(column, row);
         let [lon, lat] = self.ground.lonlat(column, row);
         let ground = LonLatHeight::new(lon, lat, f64::from(height));
@@ -120,29 +123,48 @@ impl<'a> Frames<'a> {
     /// Returns a frame of a function of columns and rows of the model; NaN where cells may not be
     /// compared.
     pub(super) fn picture(&self, frame: Frame, value: impl Fn([f64; 2]) -> f32) -> Grid<f32> {
-        let one = |at: Option<[usize; 2]>| at.and_then(|at| self.cell(at)).map_or(f32::NAN, |cell| value(cell.in_dsm));
+        let one = |at: Option<[usize; 2]>| {
+            let cell = at.filter(|at| self.holds(*at)).and_then(|at| self.cell(at));
+            cell.map_or(f32::NAN, |cell| value(cell.in_dsm))
+        };
         frame.picture(frame.cells(self.size).map(one).collect())
     }
 
-    /// Returns the mean over the bands of an image at cells; NaN where the image does not see them.
-    fn grey(&self, image: &OrthoImage, cells: &[[usize; 2]]) -> Result<Vec<f32>, RegisterError> {
-        let cells: Vec<Option<Cell>> = cells.iter().map(|at| self.cell(*at)).collect();
+    /// Returns where a camera expects the cells of a frame, row by row; `None` where it has no answer or
+    /// a cell has no height.
+    pub(super) fn places(&self, camera: &RpcCamera, frame: Frame) -> Vec<Option<ImagePoint>> {
+        let place = |at: Option<[usize; 2]>| camera.project(self.cell(at?)?.ground).ok();
+        frame.cells(self.size).map(place).collect()
+    }
+
+    /// Returns what an image shows at cells, the mean over its bands.
+    fn shown(&self, image: &OrthoImage, at: &[[usize; 2]]) -> Result<Vec<Shown>, RegisterError> {
+        let cells: Vec<Option<Cell>> = at.iter().map(|at| self.cell(*at)).collect();
         let seen = look(self.surface, image, &cells, TOLERANCE_M)?;
         let bands = seen.values.len().max(1) as f32;
-        let value = |(k, sight): (usize, &Sight)| match sight {
-            Sight::Seen { .. } => seen.values.iter().map(|band| band[k]).sum::<f32>() / bands,
-            _ => f32::NAN,
+        let shown = |(k, sight): (usize, &Sight)| Shown {
+            grey: seen.values.iter().map(|band| band[k]).sum::<f32>() / bands,
+            is_of_model: matches!(sight, Sight::Seen { .. }) && self.holds(at[k]),
         };
-        Ok(seen.sights.iter().enumerate().map(value).collect())
+        Ok(seen.sights.iter().enumerate().map(shown).collect())
     }
+}
+
+/// What an image shows at a cell.
+#[derive(Debug, Clone, Copy)]
+struct Shown {
+    /// Grey value; NaN outside of the image.
+    grey: f32,
+    /// Whether it is the model that is seen there: the model holds, and nothing hides it.
+    is_of_model: bool,
 }
 
 /// What an image shows on the grid, as far as frames of it were wanted: of a large model that is a
 /// small part.
 #[derive(Default)]
 pub(super) struct Laid {
-    /// Values by block and, within one, row by row; `None` where nothing was wanted yet.
-    blocks: HashMap<[usize; 2], Vec<Option<f32>>>,
+    /// Cells by block and, within one, row by row; `None` where nothing was wanted yet.
+    blocks: HashMap<[usize; 2], Vec<Option<Shown>>>,
 }
 
 impl Laid {
@@ -152,7 +174,7 @@ impl Laid {
             let mut value = self.reader();
             frame.cells(frames.size).flatten().filter(|at| value(*at).is_none()).collect()
         };
-        let values = frames.grey(image, &missing)?;
+        let values = frames.shown(image, &missing)?;
         for (at, value) in missing.into_iter().zip(values) {
             let (block, cell) = place(at);
             self.blocks.entry(block).or_insert_with(|| vec![None; BLOCK * BLOCK])[cell] = Some(value);
@@ -160,18 +182,28 @@ impl Laid {
         Ok(())
     }
 
-    /// Returns what the image shows in a frame that it was laid on; NaN where it does not see the
-    /// cells.
+    /// Returns what the image shows of the model in a frame that it was laid on; NaN where that is
+    /// not the model.
     pub(super) fn picture(&self, frames: &Frames<'_>, frame: Frame) -> Grid<f32> {
-        let mut value = self.reader();
-        let value = |at: Option<[usize; 2]>| at.and_then(&mut value).unwrap_or(f32::NAN);
+        self.picture_of(frames, frame, |shown| if shown.is_of_model { shown.grey } else { f32::NAN })
+    }
+
+    /// Returns all that the image shows in a frame that it was laid on, whether it is the model or
+    /// not; NaN outside of the image.
+    pub(super) fn whole_picture(&self, frames: &Frames<'_>, frame: Frame) -> Grid<f32> {
+        self.picture_of(frames, frame, |shown| shown.grey)
+    }
+
+    fn picture_of(&self, frames: &Frames<'_>, frame: Frame, value: impl Fn(Shown) -> f32) -> Grid<f32> {
+        let mut shown = self.reader();
+        let value = |at: Option<[usize; 2]>| at.and_then(&mut shown).map_or(f32::NAN, &value);
         frame.picture(frame.cells(frames.size).map(value).collect())
     }
 
-    /// Returns a function of the value of a cell, which looks for a block only where another one
+    /// Returns a function of what a cell shows, which looks for a block only where another one
     /// was asked before.
-    fn reader(&self) -> impl FnMut([usize; 2]) -> Option<f32> {
-        let mut last: ([usize; 2], Option<&Vec<Option<f32>>>) = ([usize::MAX; 2], None);
+    fn reader(&self) -> impl FnMut([usize; 2]) -> Option<Shown> {
+        let mut last: ([usize; 2], Option<&Vec<Option<Shown>>>) = ([usize::MAX; 2], None);
         move |at| {
             let (block, cell) = place(at);
             if last.0 != block {

@@ -13,6 +13,7 @@ use super::evidence::sharing;
 use super::frames::{Frame, Frames, Laid};
 use super::model::{Looks, Model, NewImage};
 use super::spots::best_spot;
+use super::vote::{self, Voter};
 use crate::ortho::OrthoImage;
 
 /// Points of a lattice along the longer side of the model.
@@ -40,6 +41,15 @@ pub(super) struct Found {
     pub(super) points: Vec<ControlPoint>,
     /// Number of points searched for.
     pub(super) tried: usize,
+}
+
+/// What is shown of the image that is searched.
+#[derive(Debug, Clone, Copy)]
+enum Shows {
+    /// Where it sees the model.
+    Model,
+    /// All of it.
+    All,
 }
 
 /// The model, as far as it was looked at.
@@ -70,32 +80,88 @@ impl<'a> Searched<'a> {
         Self { frames: Frames::new(model, surface, gsd_m), images, picture, spots: Default::default() }
     }
 
+    /// Returns the shift of the image on which the spots of the first lattice agree, up to `reach_px`
+    /// pixels; `None` where they do not.
+    pub(super) fn common_shift(
+        &mut self,
+        new: &NewImage,
+        reach_px: f64,
+        progress: &dyn Progress,
+    ) -> Result<Option<[f64; 2]>, RegisterError> {
+        let reach = reach_px.ceil() as usize;
+        let spots = self.taken_spots(0, progress)?;
+        let mut laid = Laid::default();
+        let mut voters = Vec::with_capacity(spots.len());
+        for spot in &spots {
+            progress.check_cancelled()?;
+            let frame = Frame { centre: spot.centre, half: half() };
+            laid.lay(&new.image, &self.frames, frame)?;
+            let shows = laid.picture(&self.frames, frame);
+            let mut places = self.frames.places(&new.image.camera, frame);
+            for (cell, place) in places.iter_mut().enumerate() {
+                let is_skipped = [cell % shows.width(), cell / shows.width()].iter().any(|at| at % vote::STEP > 0);
+                if is_skipped || !shows.data()[cell].is_finite() {
+                    *place = None;
+                }
+            }
+            voters.extend(Voter::read(&spot.chips, &places, &new.image, reach)?);
+        }
+        let shift = vote::common_shift(&voters, reach);
+        self.spots[0] = Some(spots);
+        Ok(shift)
+    }
+
     /// Searches for points of the model in the image, up to `reach_px` pixels from where its camera
     /// expects them.
+    ///
+    /// First the image is shown where it sees the model. The interpolation and the derivatives lose
+    /// some pixels along every border of such a picture, which is most of a small roof. If too few
+    /// points are found, the whole image is shown, and what is not the model is left out of the
+    /// chips alone. Those points see a little of what lies beside the model.
     pub(super) fn search(
         &mut self,
         new: &NewImage,
         reach_px: f64,
         progress: &dyn Progress,
     ) -> Result<Found, RegisterError> {
-        let config = ChipConfig::default();
-        let half = config.radius_max + AROUND;
         let mut laid = Laid::default();
+        let of_model = self.search_on(&mut laid, Shows::Model, new, reach_px, progress)?;
+        let count = |found: &Found| sharing(&new.image.camera, &found.points).len();
+        if count(&of_model) >= ENOUGH {
+            return Ok(of_model);
+        }
+        let of_all = self.search_on(&mut laid, Shows::All, new, reach_px, progress)?;
+        Ok(if count(&of_all) > count(&of_model) { of_all } else { of_model })
+    }
+
+    fn search_on(
+        &mut self,
+        laid: &mut Laid,
+        shows: Shows,
+        new: &NewImage,
+        reach_px: f64,
+        progress: &dyn Progress,
+    ) -> Result<Found, RegisterError> {
+        let config = ChipConfig::default();
         let mut found = Found { points: Vec::new(), tried: 0 };
-        for (lattice, from) in LATTICES.into_iter().enumerate() {
-            let spots = match self.spots[lattice].take() {
-                Some(spots) => spots,
-                None => self.spots(from, half, progress)?,
-            };
-            let around = |spot: &Spot| Frame { centre: spot.centre, half: half + reach_px.ceil() as usize };
+        for lattice in 0..LATTICES.len() {
+            let spots = self.taken_spots(lattice, progress)?;
+            let around = |spot: &Spot| Frame { centre: spot.centre, half: half() + reach_px.ceil() as usize };
             for spot in &spots {
                 progress.check_cancelled()?;
                 laid.lay(&new.image, &self.frames, around(spot))?;
             }
-            let frames = &self.frames;
+            let (frames, laid) = (&self.frames, &*laid);
             let away = |spot: &Spot| {
-                let picture = laid.picture(frames, around(spot));
-                Some((spot.centre, displacement(spot, &picture, reach_px, &config)?))
+                let away = match shows {
+                    Shows::Model => displacement(&spot.chips, &laid.picture(frames, around(spot)), reach_px, &config),
+                    Shows::All => {
+                        let seen = laid.picture(frames, Frame { centre: spot.centre, half: half() });
+                        let chips: Vec<Grid<f32>> = spot.chips.iter().map(|chip| where_seen(chip, &seen)).collect();
+                        displacement(&chips, &laid.whole_picture(frames, around(spot)), reach_px, &config)
+                    }
+                };
+                Some((spot.centre, away?))
             };
             let away: Vec<_> = spots.par_iter().filter_map(away).collect();
             found.tried += spots.len();
@@ -108,10 +174,18 @@ impl<'a> Searched<'a> {
         Ok(found)
     }
 
+    /// Takes the spots of a lattice, which are looked for where they are not known yet.
+    fn taken_spots(&mut self, lattice: usize, progress: &dyn Progress) -> Result<Vec<Spot>, RegisterError> {
+        match self.spots[lattice].take() {
+            Some(spots) => Ok(spots),
+            None => self.spots(LATTICES[lattice], progress),
+        }
+    }
+
     /// Returns the places near those of a lattice around which the model shows most, with the
-    /// model's pictures of so many cells on every side.
-    fn spots(&mut self, from: [f64; 2], half: usize, progress: &dyn Progress) -> Result<Vec<Spot>, RegisterError> {
-        let wide = half + SLACK;
+    /// model's pictures of them.
+    fn spots(&mut self, from: [f64; 2], progress: &dyn Progress) -> Result<Vec<Spot>, RegisterError> {
+        let wide = half() + SLACK;
         let centres = self.frames.centres(POINTS_ALONG, from);
         for centre in &centres {
             progress.check_cancelled()?;
@@ -129,7 +203,7 @@ impl<'a> Searched<'a> {
             let [x, y] = best_spot(&pictures(Frame { centre: [column, row], half: wide }), SLACK)?;
             let centre = [(column + x).checked_sub(wide)?, (row + y).checked_sub(wide)?];
             let is_known = frames.height_at(centre.map(|at| at as f64)).is_finite();
-            is_known.then(|| Spot { centre, chips: pictures(Frame { centre, half }) })
+            is_known.then(|| Spot { centre, chips: pictures(Frame { centre, half: half() }) })
         };
         Ok(centres.par_iter().filter_map(spot).collect())
     }
@@ -153,14 +227,30 @@ impl<'a> Searched<'a> {
     }
 }
 
-/// Returns how far from a spot of the model, in cells of the grid, the picture of the image around
-/// it shows the same; `None` where nothing is trusted.
-fn displacement(spot: &Spot, picture: &Grid<f32>, reach_px: f64, config: &ChipConfig) -> Option<[f64; 2]> {
+/// Returns the cells of a picture of a spot on every side of its middle.
+fn half() -> usize {
+    ChipConfig::default().radius_max + AROUND
+}
+
+/// Returns a chip without the cells that a picture of the same cells does not show.
+fn where_seen(chip: &Grid<f32>, seen: &Grid<f32>) -> Grid<f32> {
+    let mut out = chip.clone();
+    out.data_mut()
+        .iter_mut()
+        .zip(seen.data())
+        .filter(|(_, seen)| !seen.is_finite())
+        .for_each(|(out, _)| *out = f32::NAN);
+    out
+}
+
+/// Returns how far from the middle of chips, in cells of the grid, the picture of the image shows
+/// the same; `None` where nothing is trusted.
+fn displacement(chips: &[Grid<f32>], picture: &Grid<f32>, reach_px: f64, config: &ChipConfig) -> Option<[f64; 2]> {
     let middle = |picture: &Grid<f32>| [picture.width(), picture.height()].map(|side| (side / 2) as f64);
     let expected = middle(picture);
     let search = ChipSearch { image: picture, expected, reach_px, image_from_chip: [[1.0, 0.0], [0.0, 1.0]] };
     let find = |chip: &Grid<f32>| find_chip(Chip { picture: chip, point: middle(chip) }, &search, config).ok();
-    let places: Vec<ChipPlace> = spot.chips.iter().filter_map(find).collect();
+    let places: Vec<ChipPlace> = chips.iter().filter_map(find).collect();
     let place = common(&places)?;
     Some([0, 1].map(|axis| place[axis] - expected[axis]))
 }

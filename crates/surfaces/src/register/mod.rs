@@ -23,6 +23,7 @@ mod page;
 mod report;
 mod run;
 mod spots;
+mod vote;
 
 pub use config::{RegisterConfig, RegisterModel, RegisterOrder};
 pub use report::{RegisterReport, RegisteredImage};

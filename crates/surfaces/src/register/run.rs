@@ -10,7 +10,7 @@ use sweep::pointing::{ControlPoint, ModelOrder};
 
 use super::config::{RegisterConfig, RegisterOrder};
 use super::error::RegisterError;
-use super::evidence::{AGREES_PX, adjusted_to_most, order_of, residuals, sharing};
+use super::evidence::{AGREES_PX, POINTS_FOR_ORDERS, adjusted_to_most, order_of, residuals, sharing};
 use super::matching::{Found, Searched};
 use super::model::{Looks, Model, NewImage};
 use super::page;
@@ -18,12 +18,16 @@ use super::report::{RegisterReport, RegisteredImage};
 use job::error::JobError;
 use job::{report_page, threads};
 
-/// Most rounds of matching. The first is within a pixel, the second within a tenth.
+/// Most rounds. The first is within a pixel, the second within a tenth.
 const ROUNDS: usize = 5;
 /// Change of the correction that ends the rounds, pixels.
 const SETTLED_PX: f64 = 0.01;
-/// Search around the expected places after the first round, pixels.
+/// Search around the expected places in the second round, pixels: what a drift adds to the shift
+/// at the borders of an image of usual size.
 const CLOSE_PX: f64 = 4.0;
+/// Search in the rounds after it, pixels: as far as least-squares matching reaches. A stripe or a
+/// house further lies outside.
+const SETTLING_PX: f64 = 2.0;
 /// Least number of points.
 const POINTS_MIN: usize = 8;
 
@@ -67,12 +71,17 @@ fn register(config: &RegisterConfig, progress: &dyn Progress) -> Result<Register
     let mut searched = Searched::new(&model, &surface, new.gsd_m);
     progress.begin("rounds", ROUNDS);
     let mut rounds = 0;
+    if let Some([samples, lines]) = searched.common_shift(&new, config.reach_px, progress)? {
+        new.image.camera.correction = ImageCorrection::translation(samples, lines);
+        rounds = 1;
+        progress.step();
+    }
     loop {
         progress.check_cancelled()?;
-        let reach_px = if rounds == 0 { config.reach_px } else { CLOSE_PX.min(config.reach_px) };
+        let reach_px = [config.reach_px, CLOSE_PX, SETTLING_PX][rounds.min(2)].min(config.reach_px);
         let found = searched.search(&new, reach_px, progress)?;
         if found.points.len() < POINTS_MIN {
-            let (found, tried) = (found.points.len(), found.tried);
+            let (found, tried, reach_px) = (found.points.len(), found.tried, config.reach_px);
             return Err(RegisterError::TooFew { found, tried, needed: POINTS_MIN, reach_px });
         }
         let before = new.image.camera.clone();
@@ -82,7 +91,15 @@ fn register(config: &RegisterConfig, progress: &dyn Progress) -> Result<Register
         progress.step();
         let moved = change(&before, &new.image.camera, &found.points);
         if rounds == ROUNDS || (moved < SETTLED_PX && rounds > 1) {
-            return judged(&model, &new, &found, (rounds, order));
+            let report = judged(&model, &new, &found, (rounds, order))?;
+            if config.order == RegisterOrder::Evidence && report.agree < POINTS_FOR_ORDERS {
+                progress.warn(&format!(
+                    "{} points agree, and {POINTS_FOR_ORDERS} are needed to tell a drift and an affine map from a \
+                     shift: the correction may be off towards the borders of the image",
+                    report.agree
+                ));
+            }
+            return Ok(report);
         }
     }
 }
@@ -98,7 +115,7 @@ fn open(config: &RegisterConfig, model: &Model, camera: RpcCamera) -> Result<New
 }
 
 /// Returns the correction that follows from the points that share a shift, and its order. The first
-/// round finds a shift: matches of an image that is laid beside its place tell no more.
+/// round finds a shift where all of the model together told none: matches of an image that is laid beside its place tell no more.
 fn corrected(
     camera: &RpcCamera,
     size: (usize, usize),
