@@ -22,7 +22,7 @@ const POINTS_ALONG: usize = 16;
 const LATTICES: [[f64; 2]; 4] = [[0.5, 0.5], [0.0, 0.0], [0.5, 0.0], [0.0, 0.5]];
 /// Points that share a shift and are enough: with places to 0.2 pixels, six parameters of a
 /// correction are then known to 0.05 pixels.
-const ENOUGH: usize = 100;
+pub(super) const ENOUGH: usize = 100;
 /// Farthest that a point moves from its lattice to where more is seen, cells of a frame.
 const SLACK: usize = 24;
 /// Distance within which images of the model agree on a place, cells of a frame: the mean of those
@@ -80,14 +80,14 @@ impl<'a> Searched<'a> {
         Self { frames: Frames::new(model, surface, gsd_m), images, picture, spots: Default::default() }
     }
 
-    /// Returns the shift of the image on which the spots of the first lattice agree, up to `reach_px`
-    /// pixels; `None` where they do not.
-    pub(super) fn common_shift(
+    /// Returns the shifts of the image on which the spots of the first lattice agree, up to `reach_px`
+    /// pixels; the likeliest first.
+    pub(super) fn common_shifts(
         &mut self,
         new: &NewImage,
         reach_px: f64,
         progress: &dyn Progress,
-    ) -> Result<Option<[f64; 2]>, RegisterError> {
+    ) -> Result<Vec<[f64; 2]>, RegisterError> {
         let reach = reach_px.ceil() as usize;
         let spots = self.taken_spots(0, progress)?;
         let mut laid = Laid::default();
@@ -106,9 +106,9 @@ impl<'a> Searched<'a> {
             }
             voters.extend(Voter::read(&spot.chips, &places, &new.image, reach)?);
         }
-        let shift = vote::common_shift(&voters, reach);
+        let shifts = vote::common_shifts(&voters, reach);
         self.spots[0] = Some(spots);
-        Ok(shift)
+        Ok(shifts)
     }
 
     /// Searches for points of the model in the image, up to `reach_px` pixels from where its camera

@@ -24,6 +24,10 @@ const CELLS_MIN: usize = 15 * 15 / (STEP * STEP);
 /// spots overlap; of images of the same place it had 14 and more.
 const SIGNIFICANT: f64 = 10.0;
 
+/// Most shifts that are looked into. Crowns under another sun look like the same crowns beside
+/// their places, and stripes like the stripes beside them.
+const SHIFTS_MAX: usize = 3;
+
 /// A spot of the model, and the image around it.
 pub(super) struct Voter<'a> {
     /// Pictures of the spot, with NaN where they may not be compared.
@@ -95,17 +99,28 @@ fn correlation(known: &[(f64, usize)], pixels: &[f32], forward: usize, back: usi
     (2 * count >= known.len() && vf > 0.0 && vg > 0.0).then(|| (fg - f * g / n) / (vf * vg).sqrt())
 }
 
-/// Returns the shift at which the image shows most of the model, columns and rows of whole pixels
-/// up to `reach`; `None` where it shows nothing of it for certain.
-pub(super) fn common_shift(voters: &[Voter<'_>], reach: usize) -> Option<[f64; 2]> {
+/// Returns the shifts, columns and rows of whole pixels within `reach`, at which the image shows more
+/// of the model than at all shifts around them, and that for certain: at most [`SHIFTS_MAX`], the
+/// one that shows most first.
+pub(super) fn common_shifts(voters: &[Voter<'_>], reach: usize) -> Vec<[f64; 2]> {
     let votes: Vec<Vec<f64>> = voters.par_iter().filter_map(|voter| voter.vote(reach)).collect();
     let (count, side) = (votes.len() as f64, 2 * reach + 1);
     let mean = |k: usize| votes.iter().map(|vote| vote[k]).sum::<f64>() / count;
-    let best = (0..side * side).max_by(|a, b| mean(*a).total_cmp(&mean(*b)))?;
-    let centre = mean(best);
-    let variance = votes.iter().map(|vote| (vote[best] - centre).powi(2)).sum::<f64>() / (count - 1.0);
-    let is_significant = centre > SIGNIFICANT * (variance / count).sqrt();
-    is_significant.then(|| [best % side, best / side].map(|at| at as f64 - reach as f64))
+    let means: Vec<f64> = (0..side * side).map(mean).collect();
+    let is_peak = |k: usize| {
+        let (x, y) = (k % side, k / side);
+        let is_inside = [x, y].iter().all(|at| (1..side - 1).contains(at));
+        let around = |x: usize, y: usize| (y - 1..=y + 1).flat_map(move |v| (x - 1..=x + 1).map(move |u| v * side + u));
+        is_inside && around(x, y).all(|other| other == k || means[other] < means[k])
+    };
+    let is_significant = |k: usize| {
+        let variance = votes.iter().map(|vote| (vote[k] - means[k]).powi(2)).sum::<f64>() / (count - 1.0);
+        means[k] > SIGNIFICANT * (variance / count).sqrt()
+    };
+    let mut peaks: Vec<usize> = (0..side * side).filter(|k| is_peak(*k) && is_significant(*k)).collect();
+    peaks.sort_by(|a, b| means[*b].total_cmp(&means[*a]));
+    let shift = |k: &usize| [k % side, k / side].map(|at| at as f64 - reach as f64);
+    peaks.iter().take(SHIFTS_MAX).map(shift).collect()
 }
 
 /// Returns the mean over the bands of a window of an image.
@@ -156,20 +171,20 @@ mod tests {
         Grid::from_vec(SIDE, SIDE, (0..SIDE * SIDE).map(pixel).collect()).unwrap()
     }
 
-    fn shift_of(shown: f64) -> Option<[f64; 2]> {
+    fn shifts_of(shown: f64) -> Vec<[f64; 2]> {
         let chips: Vec<[Grid<f32>; 1]> = (0..SPOTS).map(|seed| [chip(seed)]).collect();
         let cells = (0..CHIP * CHIP).map(|i| (i, (i / CHIP + REACH) * SIDE + i % CHIP + REACH));
         let voter = |(seed, chips)| Voter { chips, cells: cells.clone().collect(), pixels: pixels(seed, shown) };
         let voters: Vec<Voter<'_>> = (0..SPOTS).zip(chips.iter().map(|chips| &chips[..])).map(voter).collect();
-        common_shift(&voters, REACH)
+        common_shifts(&voters, REACH)
     }
 
     #[test]
     fn all_spots_together_know_a_shift_that_none_shows_clearly() {
         // A chip alone correlates by 0.1 to 0.2, and 0.6 is asked of one.
-        assert_eq!(shift_of(0.15), Some([7.0, -9.0]));
-        assert_eq!(shift_of(1.0), Some([7.0, -9.0]));
-        assert_eq!(shift_of(0.0), None, "another place");
-        assert_eq!(common_shift(&[], REACH), None);
+        assert_eq!(shifts_of(0.15), [[7.0, -9.0]]);
+        assert_eq!(shifts_of(1.0), [[7.0, -9.0]]);
+        assert!(shifts_of(0.0).is_empty(), "another place");
+        assert!(common_shifts(&[], REACH).is_empty());
     }
 }
