@@ -9,6 +9,7 @@ mod completions;
 mod corrections;
 mod error;
 mod global;
+mod ground;
 mod interrupt;
 mod log;
 mod options;

@@ -7,6 +7,7 @@ use jobs::classes::ClassesConfig;
 
 use crate::corrections::corrections_of;
 use crate::error::with_hint;
+use crate::ground::GroundArgs;
 use crate::progress::RunOptions;
 use crate::{Global, Outcome};
 
@@ -43,6 +44,8 @@ pub(crate) struct Args {
     #[arg(long, value_name = "FILE")]
     index: Option<PathBuf>,
     #[command(flatten)]
+    ground: GroundArgs,
+    #[command(flatten)]
     run: RunOptions,
 }
 
@@ -55,6 +58,7 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
     config.nir_band.clone_from(&args.nir_band);
     config.corrections = corrections_of(args.corrections.as_deref());
     config.building_index.clone_from(&args.index);
+    config.terrain = args.ground.config();
     config.threads = args.run.threads;
     config.overwrite = args.run.overwrite;
     let show = args.run.show;

@@ -2,10 +2,11 @@
 
 use std::path::PathBuf;
 
+use crs::VerticalDatum;
 use jobs::dtm::DtmConfig;
-use terrain::GroundConfig;
 
 use crate::error::hinted;
+use crate::ground::GroundArgs;
 use crate::progress::RunOptions;
 use crate::{Global, Outcome};
 
@@ -17,12 +18,11 @@ pub(crate) struct Args {
     /// Folder for dtm.tif, height_above_ground.tif, ground.tif and dtm.json.
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
-    /// Width of the widest object, metres: large halls and closed blocks of houses.
-    #[arg(long, value_name = "METRES", default_value_t = GroundConfig::default().widest_object_m)]
-    widest_object: f64,
-    /// Slope of open ground, rise per run: 0.15 is 15 %. Part of the place's own slope is added.
-    #[arg(long, value_name = "RISE_PER_RUN", default_value_t = GroundConfig::default().slope)]
-    slope: f64,
+    /// Vertical datum of the surface model, if the file names none or a wrong one.
+    #[arg(long, value_name = "DATUM")]
+    dsm_vertical: Option<VerticalDatum>,
+    #[command(flatten)]
+    ground: GroundArgs,
     #[command(flatten)]
     run: RunOptions,
 }
@@ -30,8 +30,8 @@ pub(crate) struct Args {
 /// Runs `skysweep dtm`.
 pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
     let mut config = DtmConfig::new(args.surface.clone(), args.output.clone());
-    config.terrain.widest_object_m = args.widest_object;
-    config.terrain.slope = args.slope;
+    config.surface_vertical = args.dsm_vertical;
+    config.terrain = args.ground.config();
     config.threads = args.run.threads;
     config.overwrite = args.run.overwrite;
     let show = args.run.show;

@@ -113,6 +113,9 @@ pub(crate) struct Args {
     /// Seed of everything random.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
+    /// Iterations between two checkpoints.
+    #[arg(long, value_name = "N", default_value_t = 500, help_heading = "Run")]
+    checkpoint_every: u32,
     /// Go on from the checkpoint of a training that was stopped.
     #[arg(long)]
     resume: bool,
@@ -190,6 +193,7 @@ pub(crate) fn run(args: &Args, global: Global) -> anyhow::Result<Outcome> {
     config.appearance = args.appearance;
     config.transients = args.transients.unwrap_or(config.transients);
     config.seed = args.seed;
+    config.checkpoint_every = args.checkpoint_every;
     config.resume = args.resume;
     config.threads = args.run.threads;
     config.overwrite = args.run.overwrite;
@@ -221,6 +225,7 @@ fn on_images(args: &Args, splats: &Path, global: Global) -> anyhow::Result<Outco
     config.relative_heights.clone_from(&args.relative_heights);
     config.transients = args.transients.unwrap_or(config.transients);
     config.seed = args.seed;
+    config.checkpoint_every = args.checkpoint_every;
     config.resume = args.resume;
     config.threads = args.run.threads;
     config.overwrite = args.run.overwrite;

@@ -15,6 +15,7 @@ mod examples;
 #[allow(dead_code, reason = "the test looks at two errors only")]
 #[path = "../src/fault.rs"]
 mod fault;
+mod options;
 mod reports;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -409,7 +410,7 @@ from typing import Any, Literal, TypedDict
 from ._call import BoundsLike, CrsCode, PathLike, Progress, job, run as run_job
 ";
 
-fn made() -> String {
+fn all_types() -> Types {
     let mut types = Types::default();
     for folder in fs::read_dir(crates()).expect("the crates").flatten() {
         let folder = folder.path();
@@ -417,6 +418,11 @@ fn made() -> String {
             Types::read(&folder.join("src"), &mut types);
         }
     }
+    types
+}
+
+fn made() -> String {
+    let types = all_types();
     let mut writer = Writer { types: &types, named: BTreeMap::new() };
     let functions: Vec<String> = JOBS.iter().map(|entry| writer.function(entry)).collect();
     let settings: Vec<String> = SETTINGS.iter().map(|(name, text, jobs)| writer.settings(name, text, jobs)).collect();
@@ -442,6 +448,12 @@ fn the_functions_are_those_of_the_configurations_and_reports() {
         let found = fs::read_to_string(&path).unwrap_or_default();
         assert!(found == made, "{} is not what the sources say: run `make stubs`", path.display());
     }
+}
+
+#[test]
+fn every_setting_has_an_option_or_a_reason() {
+    let missing = options::missing(&crates(), &all_types());
+    assert!(missing.is_empty(), "in crates/python/tests/options: {missing:#?}");
 }
 
 fn settings(entries: &[(&str, Value)]) -> Fields {

@@ -4,6 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::common::{band, skysweep, write_like};
+use crs::VerticalDatum;
 use io::raster::{BandData, read_dem};
 use numeric::random::{hash64, unit_interval};
 use predicates::prelude::*;
@@ -79,17 +80,16 @@ fn layers_beside_a_surface_say_what_was_not_measured() {
     let folder = tempfile::tempdir().unwrap();
     let surface = folder.path().join("dsm.tif");
     std::fs::copy(town().join("dsm.tif"), &surface).unwrap();
-    let run = |name: &str, options: &[&str]| {
+    let job = |job: &str, name: &str, options: &[&str]| {
         let mut command = skysweep();
-        command.arg("dtm").arg(&surface).arg("-o").arg(folder.path().join(name));
+        command.arg(job).arg(&surface).arg("-o").arg(folder.path().join(name));
         command.args(options).args(["--progress", "none"]).assert()
     };
-    let classes = |name: &str| {
-        let mut command = skysweep();
-        command.arg("classes").arg(&surface).arg("-o").arg(folder.path().join(name));
-        command.args(["--progress", "none"]).assert()
-    };
-    run("bare", &[]).code(0).stdout(predicate::str::contains("none beside the surface"));
+    let run = |name: &str, options: &[&str]| job("dtm", name, options);
+    let classes = |name: &str| job("classes", name, &[]);
+    let bare = run("bare", &["--dsm-vertical", "egm96"]);
+    bare.code(0).stdout(predicate::str::contains("none beside the surface"));
+    assert_eq!(read_dem(folder.path().join("bare/dtm.tif")).unwrap().vertical, Some(VerticalDatum::Egm96));
     classes("bare_classes").code(0).stdout(predicate::str::contains("none beside the surface"));
 
     let dem = read_dem(&surface).unwrap();
@@ -123,7 +123,9 @@ fn layers_beside_a_surface_say_what_was_not_measured() {
     let cells = width * height;
     classes("no_classes").code(2).stderr(predicate::str::contains(format!("0 of {cells} cells with heights show")));
     for (option, name) in [("--slope=-1", "slope"), ("--widest-object=0", "widest")] {
-        run("refused", &[option]).code(2).stderr(predicate::str::contains(name));
+        for command in ["dtm", "classes"] {
+            job(command, "refused", &[option]).code(2).stderr(predicate::str::contains(name));
+        }
     }
 }
 
