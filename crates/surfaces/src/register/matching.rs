@@ -80,8 +80,8 @@ impl<'a> Searched<'a> {
         Self { frames: Frames::new(model, surface, gsd_m), images, picture, spots: Default::default() }
     }
 
-    /// Returns the shifts of the image on which the spots of the first lattice agree, up to `reach_px`
-    /// pixels; the likeliest first.
+    /// Returns the shifts of the image on which the spots of the first lattice agree, up to
+    /// `reach_px` pixels; the likeliest first.
     pub(super) fn common_shifts(
         &mut self,
         new: &NewImage,
@@ -235,11 +235,11 @@ fn half() -> usize {
 /// Returns a chip without the cells that a picture of the same cells does not show.
 fn where_seen(chip: &Grid<f32>, seen: &Grid<f32>) -> Grid<f32> {
     let mut out = chip.clone();
-    out.data_mut()
-        .iter_mut()
-        .zip(seen.data())
-        .filter(|(_, seen)| !seen.is_finite())
-        .for_each(|(out, _)| *out = f32::NAN);
+    for (out, seen) in out.data_mut().iter_mut().zip(seen.data()) {
+        if !seen.is_finite() {
+            *out = f32::NAN;
+        }
+    }
     out
 }
 

@@ -30,8 +30,8 @@ const CLOSE_PX: f64 = 4.0;
 const SETTLING_PX: f64 = 2.0;
 /// Least number of points.
 const POINTS_MIN: usize = 8;
-/// Points searched for of which one must be found and agree. At a wrong shift 1 of 50 did, under two
-/// suns in a wood (`random:8340`), at right ones 1 of 20 and more.
+/// Points searched for of which one must be found and agree. At a wrong shift 1 of 50 did, under
+/// two suns in a wood (`random:8340`), at right ones 1 of 20 and more.
 const TRIED_PER_POINT: usize = 25;
 
 /// Registers an image and writes the report with its correction.
@@ -145,7 +145,8 @@ fn open(config: &RegisterConfig, model: &Model, camera: RpcCamera) -> Result<New
 }
 
 /// Returns the correction that follows from the points that share a shift, and its order. The first
-/// round finds a shift where all of the model together told none: matches of an image that is laid beside its place tell no more.
+/// round finds a shift, where all of the model together told none: matches of an image that is laid
+/// beside its place tell no more.
 fn corrected(
     camera: &RpcCamera,
     size: (usize, usize),

@@ -23,10 +23,11 @@ const CELLS_MIN: usize = 15 * 15 / (STEP * STEP);
 /// reached 7 (ten places of `benches/evidence/registration.py`), more than chance allows, because
 /// spots overlap; of images of the same place it had 14 and more.
 const SIGNIFICANT: f64 = 10.0;
-
 /// Most shifts that are looked into. Crowns under another sun look like the same crowns beside
 /// their places, and stripes like the stripes beside them.
 const SHIFTS_MAX: usize = 3;
+/// Votes that are counted at once: those of a wide search take megabytes each.
+const COUNTED: usize = 16;
 
 /// A spot of the model, and the image around it.
 pub(super) struct Voter<'a> {
@@ -99,14 +100,21 @@ fn correlation(known: &[(f64, usize)], pixels: &[f32], forward: usize, back: usi
     (2 * count >= known.len() && vf > 0.0 && vg > 0.0).then(|| (fg - f * g / n) / (vf * vg).sqrt())
 }
 
-/// Returns the shifts, columns and rows of whole pixels within `reach`, at which the image shows more
-/// of the model than at all shifts around them, and that for certain: at most [`SHIFTS_MAX`], the
-/// one that shows most first.
+/// Returns the shifts, columns and rows of whole pixels within `reach`, at which the image shows
+/// more of the model than at all shifts around them, and that for certain: at most [`SHIFTS_MAX`],
+/// the one that shows most first.
 pub(super) fn common_shifts(voters: &[Voter<'_>], reach: usize) -> Vec<[f64; 2]> {
-    let votes: Vec<Vec<f64>> = voters.par_iter().filter_map(|voter| voter.vote(reach)).collect();
-    let (count, side) = (votes.len() as f64, 2 * reach + 1);
-    let mean = |k: usize| votes.iter().map(|vote| vote[k]).sum::<f64>() / count;
-    let means: Vec<f64> = (0..side * side).map(mean).collect();
+    let side = 2 * reach + 1;
+    let (mut count, mut means, mut squares) = (0.0, vec![0.0; side * side], vec![0.0; side * side]);
+    for some in voters.chunks(COUNTED) {
+        let votes: Vec<Vec<f64>> = some.par_iter().filter_map(|voter| voter.vote(reach)).collect();
+        for vote in votes {
+            count += 1.0;
+            means.iter_mut().zip(&vote).for_each(|(sum, vote)| *sum += vote);
+            squares.iter_mut().zip(&vote).for_each(|(sum, vote)| *sum += vote * vote);
+        }
+    }
+    means.iter_mut().for_each(|mean| *mean /= count);
     let is_peak = |k: usize| {
         let (x, y) = (k % side, k / side);
         let is_inside = [x, y].iter().all(|at| (1..side - 1).contains(at));
@@ -114,7 +122,7 @@ pub(super) fn common_shifts(voters: &[Voter<'_>], reach: usize) -> Vec<[f64; 2]>
         is_inside && around(x, y).all(|other| other == k || means[other] < means[k])
     };
     let is_significant = |k: usize| {
-        let variance = votes.iter().map(|vote| (vote[k] - means[k]).powi(2)).sum::<f64>() / (count - 1.0);
+        let variance = (squares[k] - count * means[k] * means[k]) / (count - 1.0);
         means[k] > SIGNIFICANT * (variance / count).sqrt()
     };
     let mut peaks: Vec<usize> = (0..side * side).filter(|k| is_peak(*k) && is_significant(*k)).collect();
