@@ -130,8 +130,8 @@ impl<'a> Frames<'a> {
         frame.picture(frame.cells(self.size).map(one).collect())
     }
 
-    /// Returns where a camera expects the cells of a frame, row by row; `None` where it has no answer
-    /// or a cell has no height.
+    /// Returns where a camera expects the cells of a frame, row by row; `None` where it has no
+    /// answer or a cell has no height.
     pub(super) fn places(&self, camera: &RpcCamera, frame: Frame) -> Vec<Option<ImagePoint>> {
         let place = |at: Option<[usize; 2]>| camera.project(self.cell(at?)?.ground).ok();
         frame.cells(self.size).map(place).collect()
