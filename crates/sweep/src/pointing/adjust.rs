@@ -18,7 +18,7 @@ use rayon::prelude::*;
 use super::block_system::BlockSystem;
 use super::control::ControlPoint;
 use super::intersect::{Known, Track};
-use super::model::{ModelOrder, Parameters, corrected};
+use super::model::{ModelOrder, PARAMETERS, Parameters, corrected, half_side};
 use super::reduce::Reduced;
 
 /// Parameters of the adjustment.
@@ -29,13 +29,18 @@ pub struct AdjustConfig {
     /// Standard deviation of the raw pointing, pixels: the weak prior on what ties cannot
     /// determine.
     pub prior_px: f64,
+    /// Standard deviation of what grows with the distance from the centre of an image, pixels per
+    /// pixel: the same for drifts and affine terms.
+    pub prior_drift: f64,
 }
 
 impl Default for AdjustConfig {
     /// Returns a prior of ten pixels. These are several metres, which providers state for
-    /// unadjusted products.
+    /// unadjusted products. Drifts are two pixels in a thousand: published ones are a few pixels in
+    /// ten thousand lines (Fraser and Hanley 2005). Ties hardly tell one that all views share from
+    /// a tilt or a stretch of the ground, so that it must stay small by itself.
     fn default() -> Self {
-        Self { max_order: ModelOrder::Affine, prior_px: 10.0 }
+        Self { max_order: ModelOrder::Affine, prior_px: 10.0, prior_drift: 2e-3 }
     }
 }
 
@@ -99,6 +104,7 @@ struct Problem<'a> {
     tracks: &'a [Track],
     control: Vec<(&'a ControlPoint, Known)>,
     prior_px: f64,
+    prior_drift: f64,
 }
 
 /// The tracks and control points, reduced under cameras.
@@ -134,7 +140,8 @@ pub fn adjust_to_control(
     config: &AdjustConfig,
 ) -> Adjustment {
     let control = control.iter().map(|point| (point, point.known())).collect();
-    let problem = Problem { cameras, sizes, tracks, control, prior_px: config.prior_px };
+    let AdjustConfig { prior_px, prior_drift, .. } = *config;
+    let problem = Problem { cameras, sizes, tracks, control, prior_px, prior_drift };
     let raw = problem.fit(ModelOrder::None, None);
     let independent = problem.independent(&raw.1);
     let before = raw.0.residual_px.1;
@@ -195,7 +202,7 @@ impl Problem<'_> {
 
     /// Returns the step that minimises the reweighted reduced residuals and the prior about zero.
     fn step(&self, round: &Round, x: &[Parameters], is_first: bool) -> Vec<Parameters> {
-        let prior: Vec<Parameters> = x.iter().map(|x| self.prior_weights(x)).collect();
+        let prior: Vec<Parameters> = x.iter().zip(self.sizes).map(|(x, size)| self.prior_weights(x, *size)).collect();
         let right = x.iter().zip(&prior).map(|(x, weight)| -x.component_mul(weight)).collect();
         let mut system = BlockSystem::diagonal(&prior, right);
         let tracks = || round.tracks.iter().flatten();
@@ -224,12 +231,16 @@ impl Problem<'_> {
 
     /// Returns the weights of the prior on the parameters of a view.
     ///
-    /// The shift of a view has a Cauchy weight: a view that is off by several times the prior's
-    /// deviation is then moved to the others, instead of the others being moved half-way to it.
-    fn prior_weights(&self, x: &Parameters) -> Parameters {
-        let mut out = Parameters::repeat(1.0 / (self.prior_px * self.prior_px));
-        let shift = x[0].hypot(x[1]) / self.prior_px;
-        (0..2).for_each(|i| out[i] /= 1.0 + shift * shift);
+    /// They are Cauchy weights, of the shift and of what grows from the centre: a view that is off
+    /// by several times the prior's deviation is then moved to the others, instead of the others
+    /// being moved half-way to it.
+    fn prior_weights(&self, x: &Parameters, size: (usize, usize)) -> Parameters {
+        let mut out = Parameters::zeros();
+        let drift_px = (self.prior_drift * half_side(size)).min(self.prior_px);
+        for (some, deviation) in [(0..2, self.prior_px), (2..PARAMETERS, drift_px)] {
+            let squares = some.clone().map(|i| x[i] * x[i]).sum::<f64>();
+            some.for_each(|i| out[i] = 1.0 / (deviation * deviation + squares));
+        }
         out
     }
 

@@ -89,5 +89,10 @@ pub(super) fn own_design(p: ImagePoint, size: (usize, usize), order: ModelOrder)
 /// Returns the centre of an image and half its larger side, pixels.
 fn frame((width, height): (usize, usize)) -> (ImagePoint, f64) {
     let centre = ImagePoint::new(0.5 * (width as f64 - 1.0), 0.5 * (height as f64 - 1.0));
-    (centre, 0.5 * width.max(height) as f64)
+    (centre, half_side((width, height)))
+}
+
+/// Returns half the larger side of an image, pixels.
+pub(super) fn half_side((width, height): (usize, usize)) -> f64 {
+    0.5 * width.max(height) as f64
 }
