@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail, ensure};
 use jobs::train::{
-    PriorSchedule, SatelliteTrainConfig, TrainConfig, TrainNumbers, TrainPreset, TrainPriors, TrainSchedule,
-    TrainSteps, TrainWeights,
+    CHECKPOINT_EVERY, PriorSchedule, SatelliteTrainConfig, TrainConfig, TrainNumbers, TrainPreset, TrainPriors,
+    TrainSchedule, TrainSteps, TrainWeights,
 };
 
 use crate::corrections::corrections_of;
@@ -114,7 +114,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     /// Iterations between two checkpoints.
-    #[arg(long, value_name = "N", default_value_t = 500, help_heading = "Run")]
+    #[arg(long, value_name = "N", default_value_t = CHECKPOINT_EVERY, help_heading = "Run")]
     checkpoint_every: u32,
     /// Go on from the checkpoint of a training that was stopped.
     #[arg(long)]

@@ -55,6 +55,19 @@ impl<T: Copy> Grid<T> {
     }
 }
 
+impl<T: PartialOrd> Grid<T> {
+    /// Returns whether a cell that lies not on the border is above its eight neighbours.
+    ///
+    /// ```
+    /// let grid = raster::Grid::from_vec(3, 3, vec![1, 2, 1, 0, 3, 2, 1, 1, 0]).unwrap();
+    /// assert!(grid.is_peak((1, 1)));
+    /// ```
+    pub fn is_peak(&self, (x, y): (usize, usize)) -> bool {
+        let own = &self[(x, y)];
+        (y - 1..=y + 1).all(|v| (x - 1..=x + 1).all(|u| (u, v) == (x, y) || self[(u, v)] < *own))
+    }
+}
+
 impl<T> Grid<T> {
     /// Returns a grid over row-major data, or `None` if the length is not `width · height`.
     pub fn from_vec(width: usize, height: usize, data: Vec<T>) -> Option<Self> {

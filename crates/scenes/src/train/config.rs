@@ -7,6 +7,9 @@ use serde::{Deserialize, Serialize};
 use super::recipe::{TrainNumbers, TrainPreset, TrainSchedule, TrainSteps, TrainWeights};
 use job::error::SettingError;
 
+/// Iterations between two checkpoints, if nothing else is asked for.
+pub const CHECKPOINT_EVERY: u32 = 500;
+
 /// Prior maps that a training uses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -113,7 +116,7 @@ impl TrainConfig {
             appearance: false,
             transients: false,
             seed: 1,
-            checkpoint_every: 500,
+            checkpoint_every: CHECKPOINT_EVERY,
             resume: false,
             threads: None,
             overwrite: false,

@@ -36,7 +36,7 @@ mod transients;
 
 pub(crate) use place::DatasetPlace;
 
-pub use config::{PriorSchedule, TrainConfig, TrainPriors};
+pub use config::{CHECKPOINT_EVERY, PriorSchedule, TrainConfig, TrainPriors};
 pub(crate) use error::TrainError;
 pub use recipe::{TrainNumbers, TrainPreset, TrainSchedule, TrainSteps, TrainWeights};
 pub use report::{LossPoint, TrainReport, TrainedViewRow};

@@ -10,6 +10,7 @@ use raster::Grid;
 use serde::{Deserialize, Serialize};
 use splats::{ms_ssim, psnr_db, ssim};
 
+use super::config::CHECKPOINT_EVERY;
 use super::course::{Course, Trained};
 use super::error::TrainError;
 use super::exposure::line;
@@ -129,7 +130,7 @@ impl SatelliteTrainConfig {
             steps: TrainSteps::default(),
             schedule: TrainSchedule::default(),
             seed: 1,
-            checkpoint_every: 500,
+            checkpoint_every: CHECKPOINT_EVERY,
             resume: false,
             threads: None,
             overwrite: false,

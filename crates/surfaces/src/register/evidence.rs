@@ -51,7 +51,7 @@ pub(super) fn adjusted(
     points: &[ControlPoint],
     order: ModelOrder,
 ) -> ImageCorrection {
-    let adjust = AdjustConfig { max_order: order, prior_px: PRIOR_PX, prior_drift: PRIOR_PX };
+    let adjust = AdjustConfig { max_order: order, prior_px: PRIOR_PX, prior_drift: f64::INFINITY };
     let observed = Observations { tracks: &[], control: points };
     let found = adjust_to_control(std::slice::from_ref(camera), &[size], observed, &adjust);
     found.corrections.first().copied().unwrap_or(camera.correction)

@@ -130,11 +130,19 @@ impl<'a> Frames<'a> {
         frame.picture(frame.cells(self.size).map(one).collect())
     }
 
-    /// Returns where a camera expects the cells of a frame, row by row; `None` where it has no
-    /// answer or a cell has no height.
-    pub(super) fn places(&self, camera: &RpcCamera, frame: Frame) -> Vec<Option<ImagePoint>> {
-        let place = |at: Option<[usize; 2]>| camera.project(self.cell(at?)?.ground).ok();
-        frame.cells(self.size).map(place).collect()
+    /// Returns where a camera expects the `wanted` cells of a frame, by their numbers row by row;
+    /// `None` for others, and where it has no answer or a cell has no height.
+    pub(super) fn places(
+        &self,
+        camera: &RpcCamera,
+        frame: Frame,
+        wanted: impl Fn(usize) -> bool,
+    ) -> Vec<Option<ImagePoint>> {
+        let place = |(number, at): (usize, Option<[usize; 2]>)| {
+            let at = at.filter(|_| wanted(number))?;
+            camera.project(self.cell(at)?.ground).ok()
+        };
+        frame.cells(self.size).enumerate().map(place).collect()
     }
 
     /// Returns what an image shows at cells, the mean over its bands.

@@ -97,13 +97,10 @@ impl<'a> Searched<'a> {
             let frame = Frame { centre: spot.centre, half: half() };
             laid.lay(&new.image, &self.frames, frame)?;
             let shows = laid.picture(&self.frames, frame);
-            let mut places = self.frames.places(&new.image.camera, frame);
-            for (cell, place) in places.iter_mut().enumerate() {
-                let is_skipped = [cell % shows.width(), cell / shows.width()].iter().any(|at| at % vote::STEP > 0);
-                if is_skipped || !shows.data()[cell].is_finite() {
-                    *place = None;
-                }
-            }
+            let places = self.frames.places(&new.image.camera, frame, |cell| {
+                let is_in_step = [cell % shows.width(), cell / shows.width()].iter().all(|at| at % vote::STEP == 0);
+                is_in_step && shows.data()[cell].is_finite()
+            });
             voters.extend(Voter::read(&spot.chips, &places, &new.image, reach)?);
         }
         let shifts = vote::common_shifts(&voters, reach);

@@ -105,30 +105,25 @@ fn correlation(known: &[(f64, usize)], pixels: &[f32], forward: usize, back: usi
 /// the one that shows most first.
 pub(super) fn common_shifts(voters: &[Voter<'_>], reach: usize) -> Vec<[f64; 2]> {
     let side = 2 * reach + 1;
-    let (mut count, mut means, mut squares) = (0.0, vec![0.0; side * side], vec![0.0; side * side]);
+    let (mut count, mut means, mut squares) = (0.0, Grid::filled(side, side, 0.0), vec![0.0; side * side]);
     for some in voters.chunks(COUNTED) {
         let votes: Vec<Vec<f64>> = some.par_iter().filter_map(|voter| voter.vote(reach)).collect();
         for vote in votes {
             count += 1.0;
-            means.iter_mut().zip(&vote).for_each(|(sum, vote)| *sum += vote);
+            means.data_mut().iter_mut().zip(&vote).for_each(|(sum, vote)| *sum += vote);
             squares.iter_mut().zip(&vote).for_each(|(sum, vote)| *sum += vote * vote);
         }
     }
-    means.iter_mut().for_each(|mean| *mean /= count);
-    let is_peak = |k: usize| {
-        let (x, y) = (k % side, k / side);
-        let is_inside = [x, y].iter().all(|at| (1..side - 1).contains(at));
-        let around = |x: usize, y: usize| (y - 1..=y + 1).flat_map(move |v| (x - 1..=x + 1).map(move |u| v * side + u));
-        is_inside && around(x, y).all(|other| other == k || means[other] < means[k])
+    means.data_mut().iter_mut().for_each(|mean| *mean /= count);
+    let inside = (1..side - 1).flat_map(|y| (1..side - 1).map(move |x| (x, y)));
+    let is_significant = |at: (usize, usize)| {
+        let mean = means[at];
+        let variance = (squares[at.1 * side + at.0] - count * mean * mean) / (count - 1.0);
+        mean > SIGNIFICANT * (variance / count).sqrt()
     };
-    let is_significant = |k: usize| {
-        let variance = (squares[k] - count * means[k] * means[k]) / (count - 1.0);
-        means[k] > SIGNIFICANT * (variance / count).sqrt()
-    };
-    let mut peaks: Vec<usize> = (0..side * side).filter(|k| is_peak(*k) && is_significant(*k)).collect();
+    let mut peaks: Vec<(usize, usize)> = inside.filter(|at| means.is_peak(*at) && is_significant(*at)).collect();
     peaks.sort_by(|a, b| means[*b].total_cmp(&means[*a]));
-    let shift = |k: &usize| [k % side, k / side].map(|at| at as f64 - reach as f64);
-    peaks.iter().take(SHIFTS_MAX).map(shift).collect()
+    peaks.iter().take(SHIFTS_MAX).map(|&(x, y)| [x, y].map(|at| at as f64 - reach as f64)).collect()
 }
 
 /// Returns the mean over the bands of a window of an image.

@@ -30,7 +30,8 @@ pub struct AdjustConfig {
     /// determine.
     pub prior_px: f64,
     /// Standard deviation of what grows with the distance from the centre of an image, pixels per
-    /// pixel: the same for drifts and affine terms.
+    /// pixel: the same for drifts and affine terms. At the border of an image it is at most
+    /// `prior_px`, so that infinity holds them no closer than the shift.
     pub prior_drift: f64,
 }
 

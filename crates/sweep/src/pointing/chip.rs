@@ -13,7 +13,7 @@
 
 use std::borrow::Cow;
 
-use raster::{Grid, bicubic_along, level_from_level0, level0_from_level, reduce};
+use raster::{Grid, Window, bicubic_along, level_from_level0, level0_from_level, reduce};
 
 use super::chip_fit::{Chip, ChipSearch, fit};
 use super::masked_patch::{MaskedPatch, clear_radius};
@@ -133,10 +133,10 @@ fn find(chip: Chip<'_>, search: &ChipSearch<'_>, config: &ChipConfig) -> Result<
     let own = MaskedPatch::around(chip.picture, chip.point, radius).ok_or(ChipMiss::Useless)?;
     let whole = Patch::around(chip.picture, chip.point, radius, 0.0).filter(|_| own.is_whole());
     let reach = (search.reach_px / scale(search)).ceil().max(2.0) as i32;
-    let (scores, side) = correlations((&own, whole.as_ref()), radius, search, reach);
-    let at = |i: usize, j: usize| scores[j * side + i];
-    let best = (0..scores.len()).max_by(|i, j| scores[*i].total_cmp(&scores[*j])).ok_or(ChipMiss::NoPixels)?;
-    let (i, j, score) = (best % side, best / side, scores[best]);
+    let scores = correlations((&own, whole.as_ref()), radius, search, reach);
+    let (side, data) = (scores.width(), scores.data());
+    let best = (0..data.len()).max_by(|i, j| data[*i].total_cmp(&data[*j])).ok_or(ChipMiss::NoPixels)?;
+    let (i, j, score) = (best % side, best / side, data[best]);
     if score == NO_PIXELS {
         return Err(ChipMiss::NoPixels);
     }
@@ -146,12 +146,8 @@ fn find(chip: Chip<'_>, search: &ChipSearch<'_>, config: &ChipConfig) -> Result<
     if [i, j].iter().any(|k| *k == 0 || *k == side - 1) {
         return Err(ChipMiss::AtEdge { reach_px: search.reach_px });
     }
-    let is_peak = |i: usize, j: usize| {
-        let own = at(i, j);
-        (j - 1..=j + 1).all(|v| (i - 1..=i + 1).all(|u| (u, v) == (i, j) || at(u, v) < own))
-    };
     let others = (1..side - 1).flat_map(|v| (1..side - 1).map(move |u| (u, v)));
-    let others = others.filter(|&(u, v)| (u, v) != (i, j) && is_peak(u, v)).map(|(u, v)| at(u, v));
+    let others = others.filter(|&at| at != (i, j) && scores.is_peak(at)).map(|at| scores[at]);
     let other = others.fold(NO_PIXELS, f32::max);
     if score - other < config.margin {
         return Err(ChipMiss::Ambiguous { score, other, margin: config.margin });
@@ -175,14 +171,13 @@ const SCALES: std::ops::RangeInclusive<f64> = 1e-2..=1e2;
 const HALVED_MAX: u32 = 4;
 
 /// Returns the correlations at the places around the expected one, a chip's pixel apart and up to
-/// `reach` of them away, row by row, and the length of a row. A chip without hidden pixels in an
-/// image without any goes the shorter way.
+/// `reach` of them away. A chip without hidden pixels in an image without any goes the shorter way.
 fn correlations(
     (own, whole): (&MaskedPatch, Option<&Patch>),
     radius: i32,
     search: &ChipSearch<'_>,
     reach: i32,
-) -> (Vec<f32>, usize) {
+) -> Grid<f32> {
     let (patch, side) = (2 * radius as usize + 1, 2 * reach as usize + 1);
     let far = radius + reach;
     let length = 2 * far as usize + 1;
@@ -198,7 +193,7 @@ fn correlations(
         Some(patch) => patch.correlations(picture, 0.0),
         None => own.correlations(&picture),
     };
-    ((0..side * side).map(|k| scores[(k % side, k / side)]).collect(), side)
+    scores.window(Window { x: 0, y: 0, width: side, height: side }, NO_PIXELS)
 }
 
 #[cfg(test)]
