@@ -6,7 +6,7 @@
 use numeric::Silent;
 use raster::{Grid, Window};
 use sweep::fusion::{
-    CellSource, FillConfig, FillRule, FusedSurface, GridSight, KnownVoids, TrendConfig, TrustConfig, calibrate,
+    CellSource, FillConfig, FillRule, FusedSurface, GridSight, KnownVoids, TrendConfig, Trust, TrustConfig, calibrate,
     fill_voids, ground_trend, occlusion_bounds, remove_speckle, surroundings,
 };
 use terrain::{GroundConfig, bare_ground_of_observed, goes_through_roofs};
@@ -133,8 +133,8 @@ pub(crate) fn clean_up(
         fused.sigma_m.data_mut()[i] = filled.sigma_m.data()[i];
     }
     let is_observed = |i: usize| !filled.source.data()[i].is_filled();
-    fused.confidence =
-        calibrate(&fused.height_m, &fused.single_m, &mut fused.sigma_m, &fused.confidence, is_observed, &trust);
+    let Trust { sigma_m, probability } = calibrate(fused, is_observed, &trust);
+    (fused.sigma_m, fused.confidence) = (sigma_m, probability);
     (filled.source, before - observed)
 }
 
@@ -188,7 +188,7 @@ fn drop_weak(fused: &mut FusedSurface, trust: &TrustConfig, gsd_m: f64) {
 
 /// Returns the probability that each height is right, before anything is filled.
 fn probability(fused: &FusedSurface, trust: &TrustConfig) -> Grid<f32> {
-    calibrate(&fused.height_m, &fused.single_m, &mut fused.sigma_m.clone(), &fused.confidence, |_| true, trust)
+    calibrate(fused, |_| true, trust).probability
 }
 
 fn forget_agreement_of_voids(fused: &mut FusedSurface) {

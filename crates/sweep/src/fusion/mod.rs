@@ -25,4 +25,4 @@ pub use fill::{CellSource, FillConfig, FillRule, FilledVoids, KnownVoids, fill_v
 pub use mesh::{GridFrame, PlacedView, mark_cells, place_view};
 pub use speckle::remove_speckle;
 pub use trend::{TrendConfig, ground_trend};
-pub use trust::{TrustConfig, calibrate, surroundings};
+pub use trust::{Trust, TrustConfig, calibrate, surroundings};

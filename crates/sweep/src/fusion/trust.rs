@@ -5,36 +5,40 @@
 //! matches, and views that share an image are not independent. What foretells the error of a cell
 //! are its surroundings: how much the views agree around it, and how rough the surface is.
 //!
-//! The model was fitted to simulated scenes with exact truth (towns, suburbs and towers, of one and
-//! of several dates, by two independent simulators), by quantile regression of log |error| at 68 %
-//! and by logistic regression of |error| < tolerance. Heights enter in units of the height step,
-//! which is half a pixel of parallax, so that the model holds for any resolution and
-//! base-to-height ratio. `benches/results/scenes.md` shows how it holds on real images, which took
-//! no part.
+//! The model was fitted by quantile regression of log |error| at 68 % and by logistic regression of
+//! |error| < tolerance, to fifteen simulated places with exact truth (by two independent simulators,
+//! of one and of several dates, two to twelve views) and to Buenos Aires, whose two to fourteen real
+//! dates count as much as all of these. In real images several dates have errors in common, so that
+//! deviations shrink less with their number than in simulated ones. Heights enter in units of the
+//! height step, which is half a pixel of parallax, so that the model holds for any resolution and
+//! base-to-height ratio. `benches/results/scenes.md` shows how it holds on other real images, which
+//! took no part.
 
 use raster::Grid;
 
+use super::cells::FusedSurface;
 use crate::window_sums::{window_means, window_sums};
 
 /// Share that is added to the agreement, so that it also ranks cells in unobserved surroundings.
 const UNOBSERVED: f64 = 0.1;
-/// Natural logarithm of the deviation, in height steps, of a cell with deviation and roughness of
-/// one step and without agreement.
-const SIGMA_BASE: f64 = 2.55;
+/// Natural logarithm of the deviation, in height steps, of a cell of one view with deviation and
+/// roughness of one step and without agreement.
+const SIGMA_BASE: f64 = 3.0;
 /// Exponent of the deviation from the sharpness of the costs.
 const SIGMA_SHARPNESS: f64 = 0.35;
 /// Exponent of the roughness.
-const SIGMA_ROUGHNESS: f64 = 0.45;
+const SIGMA_ROUGHNESS: f64 = 0.2;
 /// Change of the logarithm of the deviation from no agreement to full agreement.
-const SIGMA_AGREEMENT: f64 = -2.9;
+const SIGMA_AGREEMENT: f64 = -5.25;
+/// Exponent of the number of views. More views make the costs sharper, the surface smoother and the
+/// agreement larger; what they have in common they keep, and this gives it back.
+const SIGMA_VIEWS: f64 = 0.6;
 /// Smallest ratio that enters a logarithm: differences of a fiftieth of a step are rounding.
 const RATIO_MIN: f64 = 0.02;
-/// Log odds of a right height where the deviation is as large as the tolerance and no view agrees.
-const ODDS_BASE: f64 = -1.17;
+/// Log odds of a right height where the deviation is as large as the tolerance.
+const ODDS_BASE: f64 = 1.03;
 /// Increase of the log odds with the logarithm of tolerance over deviation.
-const ODDS_TOLERANCE: f64 = 0.81;
-/// Increase of the log odds from no agreement to full agreement.
-const ODDS_AGREEMENT: f64 = 5.3;
+const ODDS_TOLERANCE: f64 = 1.35;
 /// The same two for filled heights, fitted to their errors on fifteen simulated scenes, each with
 /// equal weight by the root of its cells. They are right in about half of the cells; neither the
 /// deviation nor what is observed around tells much more.
@@ -55,63 +59,59 @@ pub struct TrustConfig {
     pub camera_m: f64,
 }
 
-/// Replaces the deviations of the observed heights by calibrated ones, and returns the probability
-/// that each height is right within the tolerance; NaN in voids. The deviation of the cameras
-/// enters the deviations only: it is much smaller than the tolerance.
-///
-/// `single_m` holds the height of each cell by itself, before heights were regularised over cells:
-/// the roughness is that of these.
-///
-/// `sigma_m` holds the deviation from the sharpness of the costs where `is_observed`, and a final
-/// deviation in filled cells, metres. `agreement` is 0 to 1 where a height was observed and 0
-/// elsewhere.
+/// How far the heights of a surface are to be trusted; NaN in voids.
+#[derive(Debug, Clone)]
+pub struct Trust {
+    /// Standard deviation of each height, metres.
+    pub sigma_m: Grid<f32>,
+    /// Probability that each height is right within the tolerance.
+    pub probability: Grid<f32>,
+}
+
+/// Returns calibrated deviations of the heights of a surface, and the probability of each to be
+/// right. Heights that were not observed keep the deviation that the surface has for them, and
+/// their agreement does not count. The deviation of the cameras enters the deviations only: it is
+/// much smaller than the tolerance.
 ///
 /// ```
-/// use raster::Grid;
-/// use sweep::fusion::{TrustConfig, calibrate};
+/// use sweep::fusion::{FusionConfig, TrustConfig, calibrate, fuse_views};
 ///
-/// let height_m = Grid::filled(9, 9, 5.0f32);
-/// let (mut sigma_m, agreement) = (Grid::filled(9, 9, 0.1f32), Grid::filled(9, 9, 0.7f32));
+/// let fusion = FusionConfig { same_surface_m: 1.5, tear_m: 3.0, step_m: 0.5, origin_m: 0.0, tile: 256 };
+/// let surface = fuse_views(&[], (40, 30), &fusion);
 /// let config = TrustConfig { step_m: 0.5, tolerance_m: 1.0, reach_cells: 3, camera_m: 0.0 };
-/// let confidence = calibrate(&height_m, &height_m, &mut sigma_m, &agreement, |_| true, &config);
-/// assert!(confidence[(4, 4)] > 0.95 && sigma_m[(4, 4)] < 0.5);
+/// let trust = calibrate(&surface, |_| true, &config);
+/// assert!(trust.probability.data().iter().all(|p| p.is_nan()));
 /// ```
-pub fn calibrate(
-    height_m: &Grid<f32>,
-    single_m: &Grid<f32>,
-    sigma_m: &mut Grid<f32>,
-    agreement: &Grid<f32>,
-    is_observed: impl Fn(usize) -> bool,
-    config: &TrustConfig,
-) -> Grid<f32> {
-    let heights = height_m.data();
-    let agreed = window_means(heights.len(), height_m.width(), config.reach_cells, |i| {
-        if heights[i].is_nan() { 0.0 } else { f64::from(agreement.data()[i]) }
+pub fn calibrate(surface: &FusedSurface, is_observed: impl Fn(usize) -> bool, config: &TrustConfig) -> Trust {
+    let heights = surface.height_m.data();
+    let agreed = window_means(heights.len(), surface.height_m.width(), config.reach_cells, |i| {
+        if heights[i].is_nan() { 0.0 } else { f64::from(surface.confidence.data()[i]) }
     });
-    let roughness_m = roughness(single_m);
+    let roughness_m = roughness(&surface.single_m);
     let in_steps = |value_m: f32| (f64::from(value_m) / config.step_m).max(RATIO_MIN).ln();
-    let mut confidence = height_m.clone();
-    for (i, confidence) in confidence.data_mut().iter_mut().enumerate().filter(|(_, h)| !h.is_nan()) {
-        let share = (UNOBSERVED + agreed[i]) / (UNOBSERVED + 1.0);
+    let mut sigma_m = surface.sigma_m.clone();
+    let mut probability = surface.height_m.clone();
+    for (i, probability) in probability.data_mut().iter_mut().enumerate().filter(|(_, h)| !h.is_nan()) {
         let sigma = &mut sigma_m.data_mut()[i];
         let is_observed = is_observed(i);
         if is_observed {
             let log = SIGMA_BASE
                 + SIGMA_SHARPNESS * in_steps(*sigma)
                 + SIGMA_ROUGHNESS * in_steps(roughness_m.data()[i])
-                + SIGMA_AGREEMENT * share;
+                + SIGMA_AGREEMENT * (UNOBSERVED + agreed[i]) / (UNOBSERVED + 1.0)
+                + SIGMA_VIEWS * f64::from(surface.views.data()[i].max(1)).ln();
             *sigma = (config.step_m * log.exp()) as f32;
         }
-        let ratio = config.tolerance_m / f64::from(*sigma).max(f64::MIN_POSITIVE);
+        let ratio = (config.tolerance_m / f64::from(*sigma).max(f64::MIN_POSITIVE)).ln();
         let odds = match is_observed {
-            true => ODDS_BASE + ODDS_TOLERANCE * ratio.ln() + ODDS_AGREEMENT * share,
-            false => FILLED_ODDS_BASE + FILLED_ODDS_TOLERANCE * ratio.ln(),
+            true => ODDS_BASE + ODDS_TOLERANCE * ratio,
+            false => FILLED_ODDS_BASE + FILLED_ODDS_TOLERANCE * ratio,
         };
-        *confidence = (1.0 / (1.0 + (-odds).exp())) as f32;
+        *probability = (1.0 / (1.0 + (-odds).exp())) as f32;
         let camera_m = if is_observed { config.camera_m } else { 0.0 };
         *sigma = f64::from(*sigma).hypot(camera_m) as f32;
     }
-    confidence
+    Trust { sigma_m, probability }
 }
 
 /// Averages the probabilities of right heights over the square that reaches `reach_cells` to each
@@ -151,39 +151,56 @@ mod tests {
 
     const CONFIG: TrustConfig = TrustConfig { step_m: 0.5, tolerance_m: 1.0, reach_cells: 3, camera_m: 0.0 };
 
+    /// A level surface of three views that agree.
+    fn level((width, height): (usize, usize)) -> FusedSurface {
+        let height_m = Grid::filled(width, height, 5.0f32);
+        FusedSurface {
+            single_m: height_m.clone(),
+            sigma_m: height_m.map(|_| 0.1),
+            views: height_m.map(|_| 3),
+            confidence: height_m.map(|_| 0.7),
+            seen: height_m.map(|_| true),
+            height_m,
+        }
+    }
+
     #[test]
     fn what_stands_alone_or_is_rough_is_believed_less_and_filled_deviations_stay() {
-        let mut height_m = Grid::filled(40, 20, 5.0f32);
-        let mut agreement = Grid::filled(40, 20, 0.7f32);
-        (0..20).for_each(|y| (30..40).for_each(|x| height_m[(x, y)] = 5.0 + 3.0 * ((x + y) % 2) as f32));
-        (0..20).for_each(|y| (0..10).for_each(|x| agreement[(x, y)] = 0.0));
-        height_m[(20, 10)] = f32::NAN;
-        let mut sigma_m = Grid::filled(40, 20, 0.1f32);
+        let mut surface = level((40, 20));
+        for y in 0..20 {
+            (30..40).for_each(|x| surface.height_m[(x, y)] += 3.0 * ((x + y) % 2) as f32);
+            surface.confidence.row_mut(y)[..10].fill(0.0);
+        }
+        surface.height_m[(20, 10)] = f32::NAN;
+        surface.single_m = surface.height_m.clone();
         let filled = 12 * 40 + 4;
-        sigma_m.data_mut()[filled] = 2.5;
-        let confidence = calibrate(&height_m, &height_m, &mut sigma_m, &agreement, |i| i != filled, &CONFIG);
-        assert!(confidence[(20, 10)].is_nan());
+        surface.sigma_m.data_mut()[filled] = 2.5;
+        let Trust { sigma_m, probability } = calibrate(&surface, |i| i != filled, &CONFIG);
+        assert!(probability[(20, 10)].is_nan());
         let [smooth, alone, rough] = [(16, 3), (2, 3), (36, 10)];
-        assert!(sigma_m[smooth] < sigma_m[rough] && sigma_m[smooth] < sigma_m[alone]);
-        assert!(
-            confidence[alone] < 0.6 && confidence[alone] < confidence[rough] && confidence[rough] < confidence[smooth]
-        );
+        assert!(sigma_m[smooth] < sigma_m[rough] && sigma_m[rough] < sigma_m[alone]);
+        assert!(probability[alone] < 0.5 && probability[alone] < probability[rough]);
+        assert!(probability[rough] < probability[smooth] && probability[smooth] > 0.9);
         assert_eq!(sigma_m.data()[filled], 2.5);
-        assert!((0.5..0.65).contains(&confidence.data()[filled]), "{}", confidence.data()[filled]);
+        assert!((0.5..0.65).contains(&probability.data()[filled]), "{}", probability.data()[filled]);
+    }
+
+    #[test]
+    fn views_that_tell_no_more_make_no_height_more_certain() {
+        let sigma_of = |views: u8| {
+            let mut surface = level((9, 9));
+            surface.views = surface.views.map(|_| views);
+            calibrate(&surface, |_| true, &CONFIG).sigma_m[(4, 4)]
+        };
+        assert!(sigma_of(2) < sigma_of(3) && sigma_of(3) < sigma_of(12));
     }
 
     #[test]
     fn what_the_cameras_leave_adds_to_the_deviation_of_observed_heights() {
-        let (height_m, agreement) = (Grid::filled(9, 9, 5.0f32), Grid::filled(9, 9, 0.7f32));
-        let calibrated = |camera_m: f64| {
-            let mut sigma_m = Grid::filled(9, 9, 0.1f32);
-            let config = TrustConfig { camera_m, ..CONFIG };
-            let confidence = calibrate(&height_m, &height_m, &mut sigma_m, &agreement, |i| i != 0, &config);
-            (sigma_m, confidence)
-        };
-        let ((exact, p), (off, q)) = (calibrated(0.0), calibrated(0.3));
-        assert!((off[(4, 4)] - exact[(4, 4)].hypot(0.3)).abs() < 1e-6);
-        assert_eq!((off[(0, 0)], p), (exact[(0, 0)], q));
+        let calibrated = |camera_m: f64| calibrate(&level((9, 9)), |i| i != 0, &TrustConfig { camera_m, ..CONFIG });
+        let (exact, off) = (calibrated(0.0), calibrated(0.3));
+        assert!((off.sigma_m[(4, 4)] - exact.sigma_m[(4, 4)].hypot(0.3)).abs() < 1e-6);
+        assert_eq!((off.sigma_m[(0, 0)], off.probability), (exact.sigma_m[(0, 0)], exact.probability));
     }
 
     #[test]
@@ -197,15 +214,15 @@ mod tests {
 
     #[test]
     fn the_model_knows_no_unit_but_the_height_step() {
-        let heights = |scale: f32| {
-            Grid::from_vec(12, 12, (0..144).map(|i| scale * ((i * 37 % 11) as f32 * 0.1)).collect()).unwrap()
-        };
-        let agreement = Grid::filled(12, 12, 0.5f32);
         let calibrated = |scale: f32| {
-            let mut sigma_m = Grid::filled(12, 12, 0.1 * scale);
+            let mut surface = level((12, 12));
+            let heights = (0..144).map(|i| scale * ((i * 37 % 11) as f32 * 0.1));
+            surface.height_m = Grid::from_vec(12, 12, heights.collect()).unwrap();
+            surface.single_m = surface.height_m.clone();
+            surface.sigma_m = surface.sigma_m.map(|sigma_m| sigma_m * scale);
             let config = TrustConfig { step_m: 0.5 * f64::from(scale), tolerance_m: f64::from(scale), ..CONFIG };
-            let confidence = calibrate(&heights(scale), &heights(scale), &mut sigma_m, &agreement, |_| true, &config);
-            (sigma_m.map(|s| s / scale), confidence)
+            let Trust { sigma_m, probability } = calibrate(&surface, |_| true, &config);
+            (sigma_m.map(|sigma_m| sigma_m / scale), probability)
         };
         let ((fine, p), (coarse, q)) = (calibrated(1.0), calibrated(4.0));
         let near =
