@@ -22,8 +22,8 @@ const SPECKLE_SIDE_M: f64 = 2.5;
 const AGREEMENT_MIN: f32 = 0.05;
 /// A height that is right with a smaller probability than this is dropped where those around it are
 /// not much better, as on water. A tree stands among heights that are right.
-const RIGHT_MIN: f32 = 0.2;
-const RIGHT_MIN_AROUND: f32 = 0.35;
+const RIGHT_MIN: f32 = 0.25;
+const RIGHT_MIN_AROUND: f32 = 0.4;
 /// Distance over which the heights around are judged, metres: half the width of a canal.
 const WATER_M: f64 = 10.0;
 /// Only heights that are rather right than wrong hide the ground: a single wrong one would throw a
