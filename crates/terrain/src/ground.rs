@@ -34,8 +34,9 @@ const WORK_CELL_M: f64 = 1.0;
 /// Trend before any object is known: planes as wide as a city block, on the lower part of the
 /// surface.
 const FIRST_TREND: TrendConfig = TrendConfig { half_width_m: 50.0, quantile: 0.1, is_lower: true };
-/// Trend of the ground between the objects of the first search.
-const SECOND_TREND: TrendConfig = TrendConfig { half_width_m: 40.0, quantile: 0.5, is_lower: false };
+/// Trend of the ground between the objects of the first search. It is narrower: without objects,
+/// planes may bend with the ground.
+const SECOND_TREND: TrendConfig = TrendConfig { half_width_m: 20.0, quantile: 0.5, is_lower: false };
 /// Width of the ring around objects in which ramps and low walls are looked for, metres.
 const RING_M: f64 = 3.0;
 /// Height above the ground around it up to which a cell of the ring, or a cell of the surface, is
