@@ -20,8 +20,9 @@ use job::map_surface;
 
 /// Most cells of the picture of splats from above.
 const CELLS_MAX: f64 = (1u64 << 26) as f64;
-/// Probability below which a height is no evidence: it is wrong more often than right.
-const LEAST_CONFIDENCE: f32 = 0.5;
+/// Probability below which a height is no evidence: it is clearly more often wrong than right. Most of
+/// the ground of weak surfaces lies just below one half, and images are still placed on it.
+const LEAST_CONFIDENCE: f32 = 0.4;
 /// Rise per run of a height jump between neighbouring cells: steeper than roofs and most slopes.
 const JUMP_SLOPE: f32 = 2.0;
 /// Cells beside a height jump that are not compared: they lie on the wall between two heights, or
