@@ -34,9 +34,12 @@ const WORK_CELL_M: f64 = 1.0;
 /// Trend before any object is known: planes as wide as a city block, on the lower part of the
 /// surface.
 const FIRST_TREND: TrendConfig = TrendConfig { half_width_m: 50.0, quantile: 0.1, is_lower: true };
-/// Trend of the ground between the objects of the first search. It is narrower: without objects,
-/// planes may bend with the ground.
-const SECOND_TREND: TrendConfig = TrendConfig { half_width_m: 20.0, quantile: 0.5, is_lower: false };
+/// Trends of the ground between the objects of the searches before. The last is narrower: without
+/// objects, planes may bend with the ground. Of a hall that none has found, it would follow the roof.
+const LATER_TRENDS: [TrendConfig; 2] = [
+    TrendConfig { half_width_m: 40.0, quantile: 0.5, is_lower: false },
+    TrendConfig { half_width_m: 20.0, quantile: 0.5, is_lower: false },
+];
 /// Width of the ring around objects in which ramps and low walls are looked for, metres.
 const RING_M: f64 = 3.0;
 /// Height above the ground around it up to which a cell of the ring, or a cell of the surface, is
@@ -111,7 +114,7 @@ pub fn bare_ground_of_observed(
     }
     let side = work_side(cell_m);
     let work_m = cell_m * side as f64;
-    progress.begin("ground", 2 * radii(config.widest_object_m / work_m).len());
+    progress.begin("ground", (1 + LATER_TRENDS.len()) * radii(config.widest_object_m / work_m).len());
     let whole_m = blocks(surface, side);
     let noise_m = noise_of(&whole_m, work_m);
     let observed = unobserved.map_or(Cow::Borrowed(surface), |mask| Cow::Owned(without_cells(surface, mask)));
@@ -144,11 +147,13 @@ pub fn bare_ground_of_observed(
         let heights = Heights { clear: &clear_m, whole: &evidence_m, cell_m: work_m, noise_m };
         let first = trend(&clear_m, work_m, &FIRST_TREND);
         found = objects(&heights, (&first, &slopes(&first, work_m)), config, progress)?;
-        let known = filled(&without_cells(&clear_m, &found));
-        // What one of the trends hides, the other shows; ground joins again below.
-        let second = trend(&known, work_m, &SECOND_TREND);
-        let again = objects(&heights, (&second, &smooth_slopes(&known, work_m)), config, progress)?;
-        add(&mut found, &again);
+        // What one of the trends hides, another shows; ground joins again below.
+        for later in &LATER_TRENDS {
+            let known = filled(&without_cells(&clear_m, &found));
+            let again =
+                objects(&heights, (&trend(&known, work_m, later), &smooth_slopes(&known, work_m)), config, progress)?;
+            add(&mut found, &again);
+        }
     }
     let hidden_m = unobserved.map(|_| &evidence_m);
     let is_stray = stray(&without_cells(&clear_m, &found), hidden_m, work_m, noise_m);

@@ -28,7 +28,7 @@ const RIGHT_MIN_AROUND: f32 = 0.4;
 const WATER_M: f64 = 10.0;
 /// Only heights that are hardly more often wrong than right hide the ground: a single wrong one
 /// would throw a long shadow. On weak surfaces most of the ground itself lies just below one half.
-const TRUSTED: f32 = 0.4;
+const TRUSTED: f32 = 0.45;
 /// Patches of at least this many cells are never speckle, whatever the cell size.
 const SPECKLE_CELLS_MIN: usize = 9;
 /// Distance of known heights between which a void is filled, metres: a wide street or a house.

@@ -20,8 +20,8 @@ use job::map_surface;
 
 /// Most cells of the picture of splats from above.
 const CELLS_MAX: f64 = (1u64 << 26) as f64;
-/// Probability below which a height is no evidence: it is clearly more often wrong than right. Most of
-/// the ground of weak surfaces lies just below one half, and images are still placed on it.
+/// Probability below which a height is no evidence: it is clearly more often wrong than right. Most
+/// of the ground of weak surfaces lies just below one half, and images are still placed on it.
 const LEAST_CONFIDENCE: f32 = 0.4;
 /// Rise per run of a height jump between neighbouring cells: steeper than roofs and most slopes.
 const JUMP_SLOPE: f32 = 2.0;
