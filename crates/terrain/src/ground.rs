@@ -35,7 +35,7 @@ const WORK_CELL_M: f64 = 1.0;
 /// surface.
 const FIRST_TREND: TrendConfig = TrendConfig { half_width_m: 50.0, quantile: 0.1, is_lower: true };
 /// Trends of the ground between the objects of the searches before. The last is narrower: without
-/// objects, planes may bend with the ground. Of a hall that none has found, it would follow the roof.
+/// objects, planes may bend with the ground. It would follow the roof of a hall that none found.
 const LATER_TRENDS: [TrendConfig; 2] = [
     TrendConfig { half_width_m: 40.0, quantile: 0.5, is_lower: false },
     TrendConfig { half_width_m: 20.0, quantile: 0.5, is_lower: false },

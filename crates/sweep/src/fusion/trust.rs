@@ -6,9 +6,9 @@
 //! are its surroundings: how much the views agree around it, and how rough the surface is.
 //!
 //! The model was fitted by quantile regression of log |error| at 68 % and by logistic regression of
-//! |error| < tolerance, to fifteen simulated places with exact truth (by two independent simulators,
-//! of one and of several dates, two to twelve views) and to Buenos Aires, whose two to fourteen real
-//! dates count as much as all of these. In real images several dates have errors in common, so that
+//! |error| < tolerance, to fifteen simulated places with exact truth (by two simulators, of one and
+//! of several dates, two to twelve views) and to Buenos Aires, whose two to fourteen real dates
+//! count as much as all of these. In real images several dates have errors in common, so that
 //! deviations shrink less with their number than in simulated ones. Heights enter in units of the
 //! height step, which is half a pixel of parallax, so that the model holds for any resolution and
 //! base-to-height ratio. `benches/results/scenes.md` shows how it holds on other real images, which
