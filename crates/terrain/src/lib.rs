@@ -11,9 +11,9 @@
 //!    candidate, as in that of Zhang et al. (2003, <https://doi.org/10.1109/TGRS.2003.810682>).
 //!    A candidate is an object if the surface drops along most of its border by about as much as
 //!    the candidate stands above the opened surface. A hilltop or a terrace that an opening cuts
-//!    off has no such border, and stays. The search is done twice, on the surface relative to its
-//!    trend, so that slopes do not hide low halls. The first trend follows the lower part of the
-//!    surface, the second the ground that the first search left.
+//!    off has no such border, and stays. The search is done three times, on the surface relative to
+//!    its trend, so that slopes do not hide low halls. The first trend follows the lower part of
+//!    the surface, the others the ground that the searches before have left, the last one closely.
 //! 3. What is left of objects is taken away: small parts off the plate through the large ones, and
 //!    parts a storey above the largest. Ground that was taken away **joins again** where it lies at
 //!    the ground expected from that around it, within a tolerance that grows with the slope.

@@ -13,7 +13,7 @@ use crate::surface_layer::{self, NO_LAYERS, SIGMA};
 use job::files::FileError;
 
 /// Probability below which a cell is no evidence: the DSM itself drops such heights where those
-/// around are weak, too. In ten simulated places 0.1 gave a worse ground, and 0.35 none better.
+/// around are weak, too. On ten simulated places 0.1 gives a worse ground, and 0.35 no better one.
 const LEAST_CONFIDENCE: f32 = 0.25;
 
 /// Layers that were found beside a surface, and what they say.

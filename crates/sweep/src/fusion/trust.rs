@@ -30,8 +30,9 @@ const SIGMA_SHARPNESS: f64 = 0.35;
 const SIGMA_ROUGHNESS: f64 = 0.2;
 /// Change of the logarithm of the deviation from no agreement to full agreement.
 const SIGMA_AGREEMENT: f64 = -5.25;
-/// Exponent of the number of views. More views make the costs sharper, the surface smoother and the
-/// agreement larger; what they have in common they keep, and this gives it back.
+/// Exponent of the number of views. With their number costs become sharper, surfaces smoother and
+/// agreements larger, and the three terms above make the deviation smaller than errors that the
+/// views have in common allow.
 const SIGMA_VIEWS: f64 = 0.6;
 /// Smallest ratio that enters a logarithm: differences of a fiftieth of a step are rounding.
 const RATIO_MIN: f64 = 0.02;
@@ -68,19 +69,27 @@ pub struct Trust {
     pub probability: Grid<f32>,
 }
 
-/// Returns calibrated deviations of the heights of a surface, and the probability of each to be
-/// right. Heights that were not observed keep the deviation that the surface has for them, and
-/// their agreement does not count. The deviation of the cameras enters the deviations only: it is
-/// much smaller than the tolerance.
+/// Returns calibrated deviations of the heights of a fused surface, and the probability of each to
+/// be right. Heights that were not observed keep the deviation that the surface has for them; their
+/// agreement, the `confidence` of the surface, must be 0. The deviation of the cameras enters the
+/// deviations only: it is much smaller than the tolerance.
 ///
 /// ```
-/// use sweep::fusion::{FusionConfig, TrustConfig, calibrate, fuse_views};
+/// use raster::Grid;
+/// use sweep::fusion::{FusedSurface, TrustConfig, calibrate};
 ///
-/// let fusion = FusionConfig { same_surface_m: 1.5, tear_m: 3.0, step_m: 0.5, origin_m: 0.0, tile: 256 };
-/// let surface = fuse_views(&[], (40, 30), &fusion);
+/// let height_m = Grid::filled(9, 9, 5.0f32);
+/// let surface = FusedSurface {
+///     single_m: height_m.clone(),
+///     sigma_m: height_m.map(|_| 0.1),
+///     views: height_m.map(|_| 3),
+///     confidence: height_m.map(|_| 0.7),
+///     seen: height_m.map(|_| true),
+///     height_m,
+/// };
 /// let config = TrustConfig { step_m: 0.5, tolerance_m: 1.0, reach_cells: 3, camera_m: 0.0 };
 /// let trust = calibrate(&surface, |_| true, &config);
-/// assert!(trust.probability.data().iter().all(|p| p.is_nan()));
+/// assert!(trust.probability[(4, 4)] > 0.95 && trust.sigma_m[(4, 4)] < 0.5);
 /// ```
 pub fn calibrate(surface: &FusedSurface, is_observed: impl Fn(usize) -> bool, config: &TrustConfig) -> Trust {
     let heights = surface.height_m.data();
