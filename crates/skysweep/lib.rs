@@ -39,7 +39,7 @@
 //!   cameras).
 //! - Surfaces: [`raster`] (grids), [`city`] (city models), [`gaussian`] (splats), [`bvh`] (ray
 //!   casting), [`occlusion`].
-//! - Methods: [`sweep`] (the height sweep), [`eval`], [`priors`], [`heightmap`], [`groundview`],
+//! - Methods: [`sweep`] (the height sweep), [`reconstruct`] (views in memory to a surface), [`eval`], [`priors`], [`heightmap`], [`groundview`],
 //!   [`ortho`], [`splats`], [`terrain`], [`train`], [`tsdf`], [`change`],
 //!   [`classes`], [`buildings`], [`simulate`].
 //! - Files: [`io`] reads and writes rasters, cameras, points and splats, [`cityfiles`] city models
@@ -82,6 +82,7 @@ pub use occlusion;
 pub use ortho;
 pub use priors;
 pub use raster;
+pub use reconstruct;
 pub use report;
 pub use simulate;
 pub use splats;

@@ -1,6 +1,6 @@
 //! Baselines, overlaps, places and cameras.
 
-use jobs::dsm::{CorrectionOrder, DsmError};
+use jobs::dsm::{CorrectionOrder, DsmError, ReconstructError};
 
 use crate::stage::{EASY, Shot, Stage, look, median, triplet};
 
@@ -15,7 +15,9 @@ fn an_easy_village_is_found_where_it_is() {
 fn views_from_one_direction_have_no_parallax() {
     let stage = Stage::default();
     let refused = stage.run(&stage.shots(&[look(10.0, 12.0, 0.5), look(10.2, 12.0, 0.5)]), |_| {}).err();
-    let Some(DsmError::NoParallax { angle_deg, .. }) = refused else { panic!("{refused:?}") };
+    let Some(DsmError::Reconstruct(ReconstructError::NoParallax { angle_deg, .. })) = refused else {
+        panic!("{refused:?}")
+    };
     assert!((angle_deg - 0.2).abs() < 0.05, "{angle_deg}");
 }
 
@@ -84,7 +86,9 @@ fn a_sliver_of_overlap_has_heights_and_less_is_refused() {
     score.expect("a fifth of the images", 0.85, 0.06);
     let (stage, shots, _) = strip(0.03);
     let refused = stage.run(&shots, |_| {}).err();
-    let Some(DsmError::NoOverlap { share_percent }) = refused else { panic!("{refused:?}") };
+    let Some(DsmError::Reconstruct(ReconstructError::NoOverlap { share_percent })) = refused else {
+        panic!("{refused:?}")
+    };
     assert!((1.0..5.0).contains(&share_percent), "{share_percent}");
 }
 

@@ -5,73 +5,19 @@ use std::path::{Path, PathBuf};
 use crs::VerticalDatum;
 use io::areas::AreaName;
 use io::raster::BandChoice;
+use reconstruct::{Fill, HeightRange, ImagePair, MapBounds, Preset};
 use serde::{Deserialize, Serialize};
 
+use crate::adapters::positions_from_one;
 use crate::error::{DsmError, DsmSetting};
 use crate::products::ProductKind;
-use crate::values::{HeightRange, ImagePair, MapBounds, positions_from_one};
 
-/// Heights of the Earth's surface above the ellipsoid: the shore of the Dead Sea and Everest,
-/// rounded outward.
-pub(crate) const EARTH_RANGE: HeightRange = HeightRange::new(-500.0, 9000.0);
 /// Smaller output tiles and chunks cost more to manage than to fill, cells.
 const SIDE_MIN: usize = 64;
 /// Most images of a folder that an error names.
 const NAMED_IMAGES: usize = 8;
 /// Side of the output tiles where none is given, cells.
 const TILE_DEFAULT: usize = 1024;
-
-/// Trade-off of speed and accuracy.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Preset {
-    /// Half the resolution of the images in matching and in the DSM, and two sources per view.
-    Fast,
-    /// Full resolution, up to four sources per view, and two lattices of pixels.
-    #[default]
-    Balanced,
-    /// Full resolution, up to eight sources per view, four lattices of pixels, and sharper edges of
-    /// roofs.
-    Accurate,
-}
-
-impl Preset {
-    /// All values with the names that people give them, and their meanings.
-    pub const CHOICES: [(&'static str, Self, &'static str); 3] = [
-        ("fast", Self::Fast, "half the resolution in matching and in the DSM, two sources per view"),
-        ("balanced", Self::Balanced, "full resolution, up to four sources per view, matched on two lattices of pixels"),
-        (
-            "accurate",
-            Self::Accurate,
-            "full resolution, up to eight sources per view, matched on four lattices of pixels",
-        ),
-    ];
-}
-
-/// Choice of the voids that are closed from the heights around them. Closed cells are always
-/// marked.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Fill {
-    /// No void: every written height was observed.
-    None,
-    /// Narrow voids, voids that a surface beside them hides, and voids between known heights where
-    /// the images have texture.
-    #[default]
-    Justified,
-    /// All voids within reach of known heights, whatever caused them: water, saturated roofs, the
-    /// border of the area that two views see.
-    All,
-}
-
-impl Fill {
-    /// All values with the names that people give them, and their meanings.
-    pub const CHOICES: [(&'static str, Self, &'static str); 3] = [
-        ("none", Self::None, "no void: every height was observed"),
-        ("justified", Self::Justified, "narrow voids, voids behind buildings, voids between known heights on texture"),
-        ("all", Self::All, "all within reach of known heights"),
-    ];
-}
 
 /// Polygons of a layer.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -342,9 +288,7 @@ impl DsmConfig {
         if let Some(gsd) = self.gsd_m.filter(|gsd| !(gsd.is_finite() && *gsd > 0.0)) {
             return Err(DsmError::value(DsmSetting::CellSize, gsd.to_string(), "a positive cell size in metres"));
         }
-        let is_on_earth =
-            |r: &HeightRange| EARTH_RANGE.low_m <= r.low_m && r.low_m < r.high_m && r.high_m <= EARTH_RANGE.high_m;
-        if let Some(range) = self.height_range_m.filter(|range| !is_on_earth(range)) {
+        if let Some(range) = self.height_range_m.filter(|range| !range.is_on_earth()) {
             return Err(DsmError::value(
                 DsmSetting::HeightRange,
                 format!("{} {}", range.low_m, range.high_m),

@@ -1,5 +1,6 @@
 //! The errors of the DSM job.
 
+use reconstruct::{CELLS_MAX, HeightRange, MapBounds, ReconstructError};
 use std::fmt;
 use std::path::PathBuf;
 
@@ -8,7 +9,6 @@ use report::plain_number;
 use sweep::SweepError;
 
 use crate::products::ProductsError;
-use crate::values::{HeightRange, MapBounds};
 use job::error::{JobError, from_steps};
 use job::files::FileError;
 
@@ -155,26 +155,6 @@ pub enum DsmError {
         path: PathBuf,
         /// Failure of the camera model.
         source: camera::CameraError,
-    },
-    /// No two images share ground.
-    #[error(
-        "the images share no ground (largest overlap {share_percent:.1} % of an image); \
-         check that the RPCs belong to the images"
-    )]
-    NoOverlap {
-        /// Largest overlap found, percent of the smaller footprint.
-        share_percent: f64,
-    },
-    /// No two overlapping images look from different directions.
-    #[error(
-        "no parallax: the overlapping images look along the same line \
-         (largest angle {angle_deg:.2}°, needed {needed_deg}°); add an image from another direction"
-    )]
-    NoParallax {
-        /// Largest intersection angle found, degrees.
-        angle_deg: f64,
-        /// Least angle that gives heights, degrees.
-        needed_deg: f64,
     },
     /// All pixels of an image have one value.
     #[error("an image has no contrast: all its pixels have one value or none; give another one: {}", path.display())]
@@ -368,9 +348,9 @@ pub enum DsmError {
     /// The coordinate reference system or the vertical datum cannot be used.
     #[error("cannot use the coordinate reference system")]
     Crs(#[from] crs::CrsError),
-    /// The height sweep failed.
-    #[error("the height sweep failed")]
-    Sweep(#[from] SweepError),
+    /// The views cannot be matched, or the height sweep failed.
+    #[error(transparent)]
+    Reconstruct(ReconstructError),
     /// The worker threads cannot be started.
     #[error(transparent)]
     Threads(JobError),
@@ -400,6 +380,7 @@ failures!(DsmError: Other {
     Self::File(error) => error.kind(),
     Self::Products(error) => error.kind(),
     Self::Crs(error) => error.kind(),
+    Self::Reconstruct(error) => error.kind(),
     Self::Threads(error) => error.kind(),
     Self::Cancelled => Kind::Cancelled,
 });
@@ -422,7 +403,9 @@ impl DsmError {
         Some(match self {
             Self::NoPointing { .. } => "the pointing",
             Self::NoTies { .. } => "the heights to search",
-            Self::Sweep(SweepError::TooManyHypotheses { .. } | SweepError::HeightsTooFar { .. }) => "the heights",
+            Self::Reconstruct(ReconstructError::Sweep(
+                SweepError::TooManyHypotheses { .. } | SweepError::HeightsTooFar { .. },
+            )) => "the heights",
             Self::RangeMissesScene { .. } => "the given height range",
             Self::Memory { .. } => "the limit of memory",
             Self::BoundsMissScene { .. } => "the given bounds",
@@ -451,6 +434,27 @@ impl From<FileError> for DsmError {
             }
             other => Self::File(other),
         }
+    }
+}
+
+impl From<ReconstructError> for DsmError {
+    fn from(error: ReconstructError) -> Self {
+        match error {
+            ReconstructError::Crs(error) => Self::Crs(error),
+            ReconstructError::Cancelled => Self::Cancelled,
+            ReconstructError::Cells { columns, rows, cell: (width, height) } => Self::value(
+                DsmSetting::Bounds,
+                format!("a grid of {columns:.0} × {rows:.0} cells of {width} × {height} map units"),
+                format!("1 to {CELLS_MAX:.0} cells; bounds are x_min y_min x_max y_max in the DSM's CRS"),
+            ),
+            other => Self::Reconstruct(other),
+        }
+    }
+}
+
+impl From<SweepError> for DsmError {
+    fn from(error: SweepError) -> Self {
+        Self::Reconstruct(error.into())
     }
 }
 

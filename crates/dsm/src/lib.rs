@@ -46,12 +46,14 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod adapters;
 mod chunks;
 mod config;
 mod error;
 mod georeferencing;
 mod images;
 pub mod job_file;
+mod masks;
 mod memory;
 mod notes;
 mod planning;
@@ -63,16 +65,12 @@ mod report;
 mod run;
 mod session;
 mod stac;
-mod sweeping;
-mod tuning;
-mod values;
 mod writing;
 
 pub use chunks::chunk::{ChunkContent, ChunkResult, ChunkSurface, run_chunk};
 pub(crate) use chunks::merge::Merger;
 pub use chunks::merge::{Product, merge};
-pub use chunks::rasters::ChunkRasters;
-pub use config::{DsmConfig, Fill, LayerArea, Preset};
+pub use config::{DsmConfig, LayerArea};
 pub use error::{DsmError, DsmSetting};
 pub use georeferencing::register::register;
 pub use images::character::ImageCharacter;
@@ -81,13 +79,9 @@ pub use images::input_stamps::files_of;
 pub use images::open::{Opened, open};
 pub use images::scene_image::SceneImage;
 pub use planning::chunk_plan::{ChunkPlan, ChunkSweep, ChunkWork};
-pub use planning::grid::DsmGrid;
-pub use planning::levels::SweepLevels;
 pub use planning::plan::{Plan, PlanReport, plan};
-pub use planning::view_geometry::PairGeometry;
 pub use pointing::point::{Pointed, point};
 pub use pointing::ties::PairTies;
-pub use prior::prior_findings::{BuildingFinding, PriorFindings, ViewVotes};
 pub use report::{
     CheckPointReport, ChipReport, ChunksReport, ControlPointReport, ControlReport, CorrectionOrder, DsmReport,
     FailedChunk, ImagePointing, ImageReport, LeftOut, PairReport, PointingReport, PriorReport, ReferenceReport,
@@ -95,13 +89,11 @@ pub use report::{
 };
 pub use run::run;
 pub use session::Session;
-pub use sweeping::shadow_side::ShadowCounts;
-pub use sweeping::surface::{KeptPixels, SurfaceCounts};
-pub use sweeping::view_heights::{ViewHeights, ViewImage, sweep_views};
-pub use tuning::SweepTuning;
-pub use values::{HeightRange, ImagePair, MapBounds};
+pub use writing::layers::{filled_legend, source_legend};
 pub(crate) use writing::output::{DsmFolder, refuse_results, write_config};
 pub use writing::output::{FILES, USED_CONFIG};
-pub use writing::pictures::{filled_legend, source_legend};
 
-pub use sweep::SweepError;
+pub use reconstruct::{
+    BuildingFinding, DsmGrid, Fill, HeightRange, ImagePair, KeptPixels, MapBounds, PairGeometry, Preset, PriorFindings,
+    ReconstructError, ShadowCounts, SurfaceCounts, SurfaceRasters, SweepLevels, SweepTuning, ViewVotes,
+};

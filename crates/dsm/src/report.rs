@@ -1,5 +1,6 @@
 //! The report of a run.
 
+use reconstruct::{HeightRange, MapBounds, PairGeometry};
 use std::path::PathBuf;
 
 use camera::{ImageCorrection, ImagePoint};
@@ -8,8 +9,7 @@ use numeric::Choice;
 use serde::{Deserialize, Serialize};
 use sweep::pointing::{Adjustment, ModelOrder};
 
-use crate::planning::view_geometry::PairGeometry;
-use crate::values::{HeightRange, MapBounds, null_is_nan};
+use crate::adapters::null_is_nan;
 
 /// The report of a DSM run, written as JSON.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

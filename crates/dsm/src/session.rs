@@ -7,7 +7,7 @@
 use std::path::Path;
 use std::time::Instant;
 
-use numeric::{Choice, Progress};
+use numeric::Progress;
 use sweep::SweepView;
 
 use crate::error::DsmError;
@@ -51,19 +51,5 @@ impl<'a> Session<'a> {
             None => CityPrior::read(path)?,
         };
         Ok(self.prior.insert(prior))
-    }
-}
-
-/// A watcher of work inside a step: passes on the wish to stop, and nothing else.
-pub(crate) struct Muted<'a>(pub(crate) &'a dyn Progress);
-
-impl Progress for Muted<'_> {
-    fn begin(&self, _stage: &str, _steps: usize) {}
-    fn step(&self) {}
-    fn choice(&self, _choice: &Choice) {}
-    fn warn(&self, _text: &str) {}
-
-    fn is_cancelled(&self) -> bool {
-        self.0.is_cancelled()
     }
 }

@@ -19,5 +19,5 @@ pub use names::nearest_name;
 pub use order::{
     Float, NMAD_FACTOR, middle_values, nearest_quantile, order_statistic, percentile, upper_median, upper_nmad,
 };
-pub use progress::{CancelFlag, Cancellable, Cancelled, Choice, Progress, Silent};
+pub use progress::{CancelFlag, Cancellable, Cancelled, Choice, Muted, Progress, Silent};
 pub use random::{RandomByIndex, SplitMix64};

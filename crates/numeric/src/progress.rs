@@ -144,6 +144,20 @@ impl Progress for Cancellable<'_> {
     }
 }
 
+/// A watcher of work inside a step: passes on the wish to stop, and nothing else.
+pub struct Muted<'a>(pub &'a dyn Progress);
+
+impl Progress for Muted<'_> {
+    fn begin(&self, _stage: &str, _steps: usize) {}
+    fn step(&self) {}
+    fn choice(&self, _choice: &Choice) {}
+    fn warn(&self, _text: &str) {}
+
+    fn is_cancelled(&self) -> bool {
+        self.0.is_cancelled()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,9 +1,9 @@
-//! The height sweep on arrays.
+//! The height sweep and the surface of arrays.
 
-use jobs::dsm::{HeightRange, Preset, ViewHeights, ViewImage, sweep_views as sweep};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
 use raster::Grid;
+use reconstruct::{DsmGrid, Fill, HeightRange, MapBounds, Preset, SurfaceRasters, ViewHeights, ViewImage};
 
 use crate::exception::raise;
 use crate::fault::Fault;
@@ -20,22 +20,79 @@ type Found<'py> = (
     Bound<'py, PyArray2<u8>>,
 );
 
+/// Geotransform, heights, standard deviations, probabilities, numbers of views and sources of cells.
+type Surface<'py> = (
+    [f64; 6],
+    Bound<'py, PyArray2<f32>>,
+    Bound<'py, PyArray2<f32>>,
+    Bound<'py, PyArray2<f32>>,
+    Bound<'py, PyArray2<u8>>,
+    Bound<'py, PyArray2<u8>>,
+);
+
+/// Pixels of a view (rows, columns) and its camera.
+type View<'py> = (PyReadonlyArray2<'py, f32>, PyRef<'py, RpcCore>);
+
 /// Computes the heights of views from one another.
 #[pyfunction]
 pub(crate) fn sweep_views<'py>(
     py: Python<'py>,
-    views: Vec<(PyReadonlyArray2<'py, f32>, PyRef<'py, RpcCore>)>,
+    views: Vec<View<'py>>,
     height_range: [f64; 2],
     preset: &str,
     watcher: &Bound<'py, PyAny>,
 ) -> PyResult<Vec<Found<'py>>> {
+    let (views, preset, range) = (images(py, &views)?, preset_named(py, preset)?, HeightRange::from(height_range));
+    let found = watched(py, watcher, &[], |progress| Ok(reconstruct::sweep_views(views, range, preset, progress)?))?;
+    found.into_iter().map(|heights| arrays(py, heights)).collect()
+}
+
+/// Computes the surface of views on the grid of cells of `cell_m` metres that holds the bounds.
+#[pyfunction]
+#[expect(clippy::too_many_arguments, reason = "the keywords of the Python function")]
+pub(crate) fn surface_of_views<'py>(
+    py: Python<'py>,
+    views: Vec<View<'py>>,
+    height_range: [f64; 2],
+    preset: &str,
+    bounds: [f64; 4],
+    epsg: u32,
+    cell_m: f64,
+    fill: &str,
+    watcher: &Bound<'py, PyAny>,
+) -> PyResult<Surface<'py>> {
+    let (views, preset, range) = (images(py, &views)?, preset_named(py, preset)?, HeightRange::from(height_range));
+    let known = Fill::CHOICES.iter().find(|(name, ..)| *name == fill);
+    let (_, fill, _) = *known.ok_or_else(|| unknown(py, "fill", fill, Fill::CHOICES.map(|(name, ..)| name)))?;
+    let (grid, rasters) = watched(py, watcher, &[], |progress| {
+        let grid = DsmGrid::over(MapBounds::from(bounds), epsg, cell_m)?;
+        let (rasters, _) = reconstruct::surface_of_views(views, &grid, range, preset, fill, progress)?;
+        Ok((grid, rasters))
+    })?;
+    let SurfaceRasters { origin_m, height_m, sigma_m, views, confidence, source, .. } = rasters;
+    let shape = [height_m.height(), height_m.width()];
+    let heights = height_m.map(|h| (origin_m + f64::from(*h)) as f32);
+    let single = |grid: Grid<f32>| PyArray1::from_vec(py, grid.into_vec()).reshape(shape);
+    let small = |grid: Grid<u8>| PyArray1::from_vec(py, grid.into_vec()).reshape(shape);
+    Ok((grid.geotransform.0, single(heights)?, single(sigma_m)?, single(confidence)?, small(views)?, small(source)?))
+}
+
+/// Returns the preset of a name.
+fn preset_named(py: Python<'_>, preset: &str) -> PyResult<Preset> {
     let known = Preset::CHOICES.iter().find(|(name, ..)| *name == preset);
-    let unknown = || {
-        let names = Preset::CHOICES.map(|(name, ..)| name).join(", ");
-        raise(py, &Fault::setting(format!("the preset is {preset:?}, expected one of {names}")))
-    };
-    let (_, preset, _) = known.ok_or_else(unknown)?;
-    let views = views.iter().map(|(pixels, rpc)| {
+    known
+        .map(|(_, preset, _)| *preset)
+        .ok_or_else(|| unknown(py, "preset", preset, Preset::CHOICES.map(|(name, ..)| name)))
+}
+
+/// Says which values a setting can have.
+fn unknown<const N: usize>(py: Python<'_>, setting: &str, found: &str, names: [&str; N]) -> PyErr {
+    raise(py, &Fault::setting(format!("the {setting} is {found:?}, expected one of {}", names.join(", "))))
+}
+
+/// Takes the views out of Python's arrays.
+fn images(py: Python<'_>, views: &[View<'_>]) -> PyResult<Vec<ViewImage>> {
+    let image = |(pixels, rpc): &View<'_>| {
         let array = pixels.as_array();
         let (height, width) = array.dim();
         // A row or column alone has no texture, and the pyramid none to halve.
@@ -45,11 +102,8 @@ pub(crate) fn sweep_views<'py>(
             raise(py, &Fault::setting(format!("a view has the shape ({height}, {width}), expected 2 or more of both")))
         };
         Ok(ViewImage { camera: rpc.camera.clone(), pixels: pixels.ok_or_else(too_small)? })
-    });
-    let views: Vec<ViewImage> = views.collect::<PyResult<_>>()?;
-    let range = HeightRange::from(height_range);
-    let found = watched(py, watcher, &[], |progress| Ok(sweep(views, range, *preset, progress)?))?;
-    found.into_iter().map(|heights| arrays(py, heights)).collect()
+    };
+    views.iter().map(image).collect()
 }
 
 fn arrays(py: Python<'_>, found: ViewHeights) -> PyResult<Found<'_>> {

@@ -72,6 +72,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(allow_remote, module)?)?;
     module.add_function(wrap_pyfunction!(fetch_grids, module)?)?;
     module.add_function(wrap_pyfunction!(height_sweep::sweep_views, module)?)?;
+    module.add_function(wrap_pyfunction!(height_sweep::surface_of_views, module)?)?;
     module.add_function(wrap_pyfunction!(rasters::write_grid, module)?)?;
     module.add_function(wrap_pyfunction!(rasters::read_grid, module)?)?;
     module.add_function(wrap_pyfunction!(rasters::file_crs, module)?)?;

@@ -171,6 +171,30 @@ def test_heights_of_views_in_memory(rpc: skysweep.Rpc) -> None:
     assert np.array_equal(again[0].height_m, first.height_m, equal_nan=True)
 
 
+def test_the_surface_of_views_in_memory_is_that_of_a_run(tmp_path: Path) -> None:
+    search = (170.0, 280.0)
+    skysweep.dsm(VIEWS, tmp_path, pointing=False, height_range_m=search, preset="fast", gsd_m=1.0)
+    of_run = {name: skysweep.read_raster(tmp_path / "dsm" / f"{name}.tif") for name in ["dsm", "source", "views"]}
+    run = of_run["dsm"]
+    views = [(skysweep.read_raster(path).values, skysweep.Rpc(path)) for path in VIEWS]
+    sweep = skysweep.HeightSweep(views, search, preset="fast")
+    found = sweep.surface(run.bounds, 1.0, run.epsg)
+    assert found.heights.geotransform == run.geotransform and found.heights.epsg == run.epsg
+    assert found.heights.vertical == run.vertical
+    # A run knows from its tie points how far the cameras are off, which changes a few weak cells.
+    assert np.mean(found.source == of_run["source"].values) > 0.99
+    observed = (found.source == 1) & (of_run["source"].values == 1)
+    assert np.array_equal(found.views[observed], of_run["views"].values[observed])
+    assert np.abs(found.heights.values - run.values)[observed].max() < 0.001
+    assert (found.sigma_m[observed] > 0.0).all() and ((0.0 <= found.probability) & (found.probability <= 1.0)).all()
+    with pytest.raises(skysweep.InputError, match="0 × 0 cells"):
+        sweep.surface((0.0, 0.0, 0.0, 0.0), 1.0, 32631)
+    with pytest.raises(skysweep.CrsError):
+        sweep.surface(run.bounds, 1.0, 999)
+    with pytest.raises(skysweep.InputError, match='the fill is "some"'):
+        sweep.surface(run.bounds, 1.0, run.epsg, fill="some")  # type: ignore[arg-type]
+
+
 def test_views_that_cannot_be_swept_are_exceptions(rpc: skysweep.Rpc) -> None:
     pixels = np.zeros((64, 64), dtype=np.float32)
     sweep = skysweep.HeightSweep

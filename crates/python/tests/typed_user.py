@@ -94,6 +94,8 @@ def objects() -> tuple[float, int]:
     rpc = skysweep.Rpc("a.tif")
     sample, line = rpc.project(np.zeros(3), np.zeros(3), 100.0)
     heights = skysweep.HeightSweep([(np.zeros((8, 8)), rpc)], (0.0, 100.0)).run()
+    dsm = skysweep.HeightSweep([(np.zeros((8, 8)), rpc)], (0.0, 100.0)).surface((0.0, 0.0, 9.0, 9.0), 0.5, 32631)
+    dsm.heights.sample(5.4, 43.5).min(), dsm.sigma_m[0, 0], dsm.heigths  # type: ignore[attr-defined]
     hits = skysweep.CityModel("a.city.json", lod="2.2").cast([0.0, 0.0, 9.0], [0.0, 0.0, -1.0])
     plan = skysweep.Plan("run")
     surface = skysweep.Raster(np.zeros((4, 4)), (0.0, 1.0, 0.0, 0.0, 0.0, -1.0), 32631, vertical="egm96")

@@ -4,12 +4,6 @@ use eval::CellOrigin;
 use io::raster::{Dem, ImageSource, RasterError};
 use raster::Grid;
 
-/// Value of `filled` in a cell with an observed height.
-pub const OBSERVED: u8 = 0;
-/// Value of `filled` in a cell that was filled.
-pub const FILLED: u8 = 1;
-/// Value of `filled` in a cell without a height.
-pub const VOID: u8 = 255;
 /// Where each height comes from.
 pub(crate) const SOURCE: &str = "source.tif";
 /// Whether each height was filled.

@@ -1,22 +1,21 @@
 //! Fourth stage of a run: the surface of one chunk.
 
-use numeric::Progress;
+use numeric::{Muted, Progress};
 use raster::Window;
+use reconstruct::{
+    HeightRange, PriorFindings, SceneSweep, SurfaceCounts, SurfaceInput, SurfaceOptions, SurfaceRasters, make_surface,
+    sweep_scene,
+};
 use sweep::SweepView;
 
-use crate::chunks::rasters::ChunkRasters;
 use crate::error::DsmError;
 use crate::images::image_pixels::read_view;
 use crate::images::image_windows::GroundBox;
+use crate::masks::ground_mask::mask_on;
 use crate::planning::chunk_plan::{ChunkSweep, ChunkWork, read_chunk_views};
 use crate::planning::chunk_side::FINEST_MARGIN_PX;
 use crate::planning::plan::Plan;
-use crate::prior::prior_findings::PriorFindings;
-use crate::session::{Muted, Session};
-use crate::sweeping::ground_mask::GroundMask;
-use crate::sweeping::scene_sweep::{SceneSweep, sweep_scene};
-use crate::sweeping::surface::{SurfaceCounts, SurfaceInput, make_surface};
-use crate::values::HeightRange;
+use crate::session::Session;
 
 /// Fourth stage of a run: the result of one chunk. [`ChunkResult::write`] and [`ChunkResult::read`]
 /// keep it in a folder.
@@ -49,7 +48,7 @@ pub enum ChunkContent {
 #[non_exhaustive]
 pub struct ChunkSurface {
     /// Rasters of the core.
-    pub rasters: ChunkRasters,
+    pub rasters: SurfaceRasters,
     /// Counts of cells and pixels.
     pub counts: SurfaceCounts,
     /// Number of pixel-hypothesis pairs evaluated.
@@ -63,7 +62,7 @@ pub struct ChunkSurface {
 impl ChunkSurface {
     /// Makes the surface of a chunk of which no cell gets a height.
     fn masked(core: Window, height_range: HeightRange) -> Self {
-        let rasters = ChunkRasters::masked((core.width, core.height));
+        let rasters = SurfaceRasters::masked((core.width, core.height));
         let counts = SurfaceCounts::of(&rasters);
         Self { rasters, counts, hypotheses: 0, height_range, findings: PriorFindings::default() }
     }
@@ -72,7 +71,7 @@ impl ChunkSurface {
 /// Computes the chunk with number `index` (counted from 0) of a plan.
 ///
 /// # Errors
-/// [`DsmError::NoSuchChunk`], [`DsmError::Image`], [`DsmError::Prior`], [`DsmError::Sweep`],
+/// [`DsmError::NoSuchChunk`], [`DsmError::Image`], [`DsmError::Prior`], [`DsmError::Reconstruct`],
 /// [`DsmError::Crs`], [`DsmError::Cancelled`].
 pub fn run_chunk(plan: &Plan, index: usize, session: &mut Session<'_>) -> Result<ChunkResult, DsmError> {
     session.progress.check_cancelled()?;
@@ -109,7 +108,7 @@ fn sweep_chunk(
 ) -> Result<ChunkSurface, DsmError> {
     let grid = plan.grid.part(work.extent);
     let core = Window { x: core.x - work.extent.x, y: core.y - work.extent.y, ..core };
-    let mask = GroundMask::on(&plan.config, &grid)?;
+    let mask = mask_on(&plan.config, &grid)?;
     if mask.as_ref().is_some_and(|mask| mask.excludes_all(core)) {
         return Ok(ChunkSurface::masked(core, work.height_range));
     }
@@ -142,7 +141,11 @@ fn sweep_chunk(
         session.lap("sweep");
     }
     let input = SurfaceInput {
-        config: &plan.config,
+        options: SurfaceOptions {
+            fill: plan.config.fill,
+            height_range: plan.config.height_range_m,
+            tile: plan.config.tile,
+        },
         sweep: &sweep,
         useful: &plan.useful,
         grid: &grid,

@@ -4,14 +4,11 @@
 //! searched, and counts that are not those of the rasters, are no result.
 
 use crate::chunks::chunk::{ChunkContent, ChunkResult, ChunkSurface};
-use crate::config::EARTH_RANGE;
 use crate::error::DsmError;
 use crate::planning::chunk_plan::{ChunkSweep, ChunkWork};
 use crate::planning::plan::Plan;
-use crate::sweeping::clean_up::SURROUNDINGS_M;
-use crate::sweeping::surface::SurfaceCounts;
-use crate::values::HeightRange;
-use surfaces::surface_layer::{FILLED, VOID};
+use reconstruct::{HeightRange, SURROUNDINGS_M, SurfaceCounts};
+use sweep::fusion::{FILLED, VOID};
 
 /// Steps of the finest level that an observed height may lie outside the range: hypotheses begin
 /// and end on whole steps beyond it, and a height is refined by up to half a step more.
@@ -52,7 +49,7 @@ impl ChunkSurface {
 
     fn misfit_of_heights(&self, plan: &Plan, work: &ChunkSweep) -> Option<Misfit> {
         // Around the buildings of a city model other heights are searched, too.
-        let searched = if plan.config.prior.is_some() { EARTH_RANGE } else { work.height_range };
+        let searched = if plan.config.prior.is_some() { HeightRange::EARTH } else { work.height_range };
         let margin_m = STEPS_OUTSIDE * plan.step_m * f64::from(1u32 << work.levels.finest.min(31));
         let observed = searched.grown(margin_m, margin_m);
         let filled = searched.grown(FILLED_OUTSIDE_M, FILLED_OUTSIDE_M);

@@ -5,6 +5,7 @@
 //! result that was written and read back gives the same DSM. The folder is made beside its place
 //! and renamed, so that it is complete under its name.
 
+use reconstruct::{HeightRange, PriorFindings, SurfaceCounts, SurfaceRasters};
 use std::fs;
 use std::path::Path;
 
@@ -13,11 +14,7 @@ use raster::{Grid, Window};
 use serde::{Deserialize, Serialize};
 
 use crate::chunks::chunk::{ChunkContent, ChunkResult, ChunkSurface};
-use crate::chunks::rasters::ChunkRasters;
 use crate::error::DsmError;
-use crate::prior::prior_findings::PriorFindings;
-use crate::sweeping::surface::SurfaceCounts;
-use crate::values::HeightRange;
 use job::files::TEXT_LIMIT;
 
 /// Name of the file with everything but the rasters.
@@ -114,7 +111,7 @@ impl ChunkResult {
     }
 }
 
-fn write_rasters(folder: &Path, rasters: &ChunkRasters) -> Result<(), io::FormatError> {
+fn write_rasters(folder: &Path, rasters: &SurfaceRasters) -> Result<(), io::FormatError> {
     let shape = [rasters.height_m.height(), rasters.height_m.width()];
     for (name, grid) in
         [("height.npy", &rasters.height_m), ("sigma.npy", &rasters.sigma_m), ("confidence.npy", &rasters.confidence)]
@@ -129,7 +126,7 @@ fn write_rasters(folder: &Path, rasters: &ChunkRasters) -> Result<(), io::Format
     Ok(())
 }
 
-fn read_rasters(folder: &Path, origin_m: f64, core: Window) -> Result<ChunkRasters, DsmError> {
+fn read_rasters(folder: &Path, origin_m: f64, core: Window) -> Result<SurfaceRasters, DsmError> {
     let size = (core.width, core.height);
     let floats = |name: &str| {
         read_grid(&folder.join(name), size, |data| match data {
@@ -143,7 +140,7 @@ fn read_rasters(folder: &Path, origin_m: f64, core: Window) -> Result<ChunkRaste
             _ => None,
         })
     };
-    Ok(ChunkRasters {
+    Ok(SurfaceRasters {
         origin_m,
         height_m: floats("height.npy")?,
         sigma_m: floats("sigma.npy")?,

@@ -1,5 +1,6 @@
 //! Last stage of a run: the results of the chunks become the files of the DSM and its report.
 
+use reconstruct::{HeightRange, PriorFindings, ShadowSide, SurfaceCounts, shadow_side};
 use std::path::PathBuf;
 
 use numeric::Progress;
@@ -10,11 +11,8 @@ use crate::error::DsmError;
 use crate::memory;
 use crate::notes::Notes;
 use crate::planning::plan::Plan;
-use crate::prior::prior_findings::PriorFindings;
+use crate::prior::findings_report::report_findings;
 use crate::report::{ChunksReport, DsmReport, FailedChunk, StageTime, SurfaceReport};
-use crate::sweeping::shadow_side::{ShadowSide, shadow_side};
-use crate::sweeping::surface::SurfaceCounts;
-use crate::values::HeightRange;
 use crate::writing::output::{self, ChunkedOutput, DsmFolder, FILES};
 use job::error_text::with_causes;
 
@@ -147,7 +145,7 @@ impl<'a> Merger<'a> {
         warn_of_share(plan, &self.counts, &mut self.notes);
         warn_of_streets(plan, &self.counts, &mut self.notes);
         warn_of_shadows(plan, &self.counts, &mut self.notes);
-        let prior = plan.config.prior.clone().map(|model| self.findings.report(model, &mut self.notes));
+        let prior = plan.config.prior.clone().map(|model| report_findings(&self.findings, model, &mut self.notes));
         self.progress.begin("writing", 1);
         let scene = &plan.report;
         let report = DsmReport {

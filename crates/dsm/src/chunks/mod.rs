@@ -4,4 +4,3 @@ pub(super) mod chunk;
 pub(super) mod chunk_check;
 pub(super) mod chunk_files;
 pub(super) mod merge;
-pub(super) mod rasters;

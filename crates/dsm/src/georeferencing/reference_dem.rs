@@ -1,5 +1,6 @@
 //! A reference elevation model at the cells of a DSM, above the ellipsoid.
 
+use reconstruct::DsmGrid;
 use std::path::Path;
 
 use crs::{HeightConverter, MapProjection, VerticalDatum};
@@ -8,7 +9,6 @@ use io::raster::{Dem, ImageSource, read_dem_window};
 use raster::{GeoTransform, Grid, Window, reduce};
 
 use crate::error::{DsmError, DsmSetting};
-use crate::planning::grid::DsmGrid;
 
 /// Cells of the averaged reference that are read beyond a tile, for the average and the
 /// interpolation.

@@ -11,6 +11,7 @@
 //! their own, or shifts that do not converge. The standard error of the shift follows from those of
 //! the parts and is reported.
 
+use reconstruct::{DsmGrid, Fill, HeightRange, Preset};
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -18,11 +19,11 @@ use camera::{ImageCorrection, ImagePoint, RpcCamera};
 use crs::{MapProjection, VerticalDatum};
 use eval::{MetresFromCells, Registration, Shift, register_surfaces};
 use geodesy::LonLatHeight;
-use numeric::{Silent, nearest_quantile};
+use numeric::{Muted, Silent, nearest_quantile};
 use raster::{Grid, reduce};
 
 use crate::chunks::chunk::{ChunkContent, run_chunk};
-use crate::config::{DsmConfig, Fill, Preset};
+use crate::config::DsmConfig;
 use crate::error::{DsmError, DsmSetting};
 use crate::georeferencing::control::GroundControl;
 use crate::georeferencing::plane_fit::FittedPlane;
@@ -31,13 +32,11 @@ use crate::images::scene_image::SceneImage;
 use crate::notes::Notes;
 use crate::planning::chunk_plan::ChunkWork;
 use crate::planning::dem::warn_of_datum;
-use crate::planning::grid::{DsmGrid, choose_grid};
+use crate::planning::grid::choose_grid;
 use crate::planning::plan::{Plan, plan};
-use crate::planning::view_geometry::ViewGeometry;
 use crate::pointing::point::Pointed;
 use crate::report::ReferenceReport;
-use crate::session::{Muted, Session};
-use crate::values::HeightRange;
+use crate::session::Session;
 
 /// Largest horizontal shift that is searched for, and largest vertical shift that is believed,
 /// metres. Providers state errors of up to 10 m; a larger difference of heights is one of datums or
@@ -486,8 +485,8 @@ fn trial_cell_m(trial: &DsmConfig, pointed: &Pointed) -> Result<f64, DsmError> {
     let images = &pointed.images;
     let offsets = || images.iter().map(|image| image.camera.rpc.height_off).sum::<f64>() / images.len() as f64;
     let height_m = pointed.tie_heights.map_or_else(offsets, HeightRange::middle_m);
-    let geometry = ViewGeometry::at(images, height_m)?;
-    let pixels = images.iter().enumerate().filter_map(|(i, image)| geometry.ground_sampling_m(image, i));
+    let geometry = SceneImage::geometry(images, height_m)?;
+    let pixels = images.iter().enumerate().filter_map(|(i, image)| geometry.ground_sampling_m(&image.camera, i));
     let pixel_m = pixels.fold(0.0, f64::max);
     let grid = choose_grid(&DsmConfig { gsd_m: Some(pixel_m), ..trial.clone() }, &geometry, pixel_m)?;
     let cells = grid.size.0 as f64 * grid.size.1 as f64;

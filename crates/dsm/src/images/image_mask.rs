@@ -4,6 +4,7 @@
 //! neither 0 nor without data is masked. Polygons on the ground are seen at the mean height of the
 //! image's RPC.
 
+use reconstruct::footprint;
 use std::path::{Path, PathBuf};
 
 use camera::ImagePoint;
@@ -13,10 +14,9 @@ use io::raster::ImageSource;
 use raster::{Grid, Window, mark_inside};
 
 use crate::error::{DsmError, DsmSetting};
-use crate::images::footprints::footprint;
 use crate::images::scene_image::SceneImage;
+use crate::masks::ground_polygons::{ground_around, holds_polygons, read_polygons, rings_in_cells};
 use crate::notes::Notes;
-use crate::sweeping::ground_polygons::{ground_around, holds_polygons, read_polygons, rings_in_cells};
 
 /// Largest difference of the scales of a mask along columns and rows, as a share: one pixel of a
 /// mask of a hundred.

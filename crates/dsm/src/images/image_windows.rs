@@ -5,12 +5,10 @@ use crs::MapProjection;
 use geo::Polygon;
 use geodesy::{EnuFrame, LonLatHeight};
 use raster::Window;
+use reconstruct::{DsmGrid, HeightRange, local_polygon};
 
 use crate::error::DsmError;
-use crate::images::footprints::local_polygon;
 use crate::images::scene_image::SceneImage;
-use crate::planning::grid::DsmGrid;
-use crate::values::HeightRange;
 
 /// No image reaches further than this, pixels. Far outside its image a camera may return any
 /// position.

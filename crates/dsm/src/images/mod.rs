@@ -2,7 +2,6 @@
 
 pub(super) mod character;
 pub(super) mod doubts;
-pub(super) mod footprints;
 pub(super) mod image_mask;
 pub(super) mod image_pixels;
 pub(super) mod image_windows;

@@ -17,7 +17,7 @@ use crate::images::image_mask::masks_of_images;
 use crate::images::image_pixels::open_source;
 use crate::images::order::sort_by_content;
 use crate::images::scene_image::SceneImage;
-use crate::sweeping::ground_mask::GroundMask;
+use crate::masks::ground_mask::check_masks;
 
 /// Shares of the values below and above the spread of an image.
 const SPREAD: [f64; 2] = [0.02, 0.98];
@@ -40,7 +40,7 @@ pub struct Opened {
 /// RPC, [`DsmError::SameImage`] for two images with the same camera, [`DsmError::Value`] for a mask
 /// of none of the images.
 pub fn open(config: &DsmConfig) -> Result<Opened, DsmError> {
-    GroundMask::check(config)?;
+    check_masks(config)?;
     let masks = masks_of_images(&config.image_masks, &config.images)?;
     let opened = config.images.iter().zip(masks).enumerate();
     let opened = opened.map(|(number, (path, masks))| open_one(path, number, config.band.as_ref(), masks));

@@ -4,11 +4,11 @@
 //! that of the content the result has the same bytes in whatever order the images are given.
 //! Messages and reports count the images as they were given.
 
+use reconstruct::ImagePair;
 use std::cmp::Ordering;
 
 use crate::config::DsmConfig;
 use crate::images::scene_image::SceneImage;
-use crate::values::ImagePair;
 
 /// Sorts images by their RPCs and sizes, which no two images of a run share. Numbers are compared
 /// in turn, so that the order survives the rounding of an RPC in another file format.

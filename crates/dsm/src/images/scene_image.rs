@@ -1,11 +1,14 @@
 //! The images of a run with their cameras.
 
+use reconstruct::{ImageGeometry, ReconstructError, ViewGeometry};
 use std::path::PathBuf;
 
 use camera::{ImagePoint, RpcCamera};
 use io::stac::SunPosition;
 use raster::Window;
 use serde::{Deserialize, Serialize};
+
+use crate::error::DsmError;
 
 /// An image file with its camera.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -57,5 +60,19 @@ impl SceneImage {
     /// Returns the camera in the frame of a window.
     pub(crate) fn camera_of(&self, window: Window) -> RpcCamera {
         self.camera.cropped(ImagePoint::new(window.x as f64, window.y as f64))
+    }
+
+    /// Computes how images see the scene at `height_m`, metres above the ellipsoid.
+    ///
+    /// # Errors
+    /// [`DsmError::Camera`] for an image without a footprint, [`DsmError::Reconstruct`] when no two
+    /// images share ground.
+    pub(crate) fn geometry(images: &[Self], height_m: f64) -> Result<ViewGeometry, DsmError> {
+        let described: Vec<ImageGeometry<'_>> =
+            images.iter().map(|image| ImageGeometry { camera: &image.camera, size: image.size }).collect();
+        ViewGeometry::at(&described, height_m).map_err(|error| match error {
+            ReconstructError::Camera { view, source } => DsmError::Camera { path: images[view].path.clone(), source },
+            other => other.into(),
+        })
     }
 }

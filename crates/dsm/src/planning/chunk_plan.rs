@@ -14,30 +14,24 @@
 
 use crs::MapProjection;
 use geo::Polygon;
-use numeric::Progress;
+use numeric::{Muted, Progress};
 use raster::Window;
 use rayon::prelude::*;
+use reconstruct::{
+    DsmGrid, HeightRange, Parts, SceneSweep, SourceCandidates, SweepLevels, SweepTuning, ViewGeometry, choose_levels,
+    probe, shared_part, smallest_sides,
+};
 use serde::{Deserialize, Serialize};
 use sweep::SweepView;
 
 use crate::config::DsmConfig;
 use crate::error::DsmError;
 use crate::images::character::ImageCharacter;
-use crate::images::footprints::shared_part;
 use crate::images::image_pixels::read_coarse_view;
 use crate::images::image_windows::GroundBox;
 use crate::images::scene_image::SceneImage;
 use crate::memory;
 use crate::planning::chunk_side::{ALIGNED, MARGIN_PX, SIDE_MIN, aligned, blocks, needed_mb, quarters, with_rim};
-use crate::planning::grid::DsmGrid;
-use crate::planning::levels::{SweepLevels, choose_levels, smallest_sides};
-use crate::planning::probe;
-use crate::planning::sources::{Parts, SourceCandidates};
-use crate::planning::view_geometry::ViewGeometry;
-use crate::session::Muted;
-use crate::sweeping::scene_sweep::SceneSweep;
-use crate::tuning::SweepTuning;
-use crate::values::HeightRange;
 use job::error_text::with_causes;
 
 /// A part of an image less wide or high than this holds nothing to match, pixels.

@@ -3,6 +3,7 @@
 //! A chunk has a core, which is kept, and a rim of ground around it, as wide as what decides the
 //! content of a cell.
 
+use reconstruct::{DsmGrid, HeightRange, SURROUNDINGS_M};
 use std::collections::HashMap;
 
 use raster::Window;
@@ -12,9 +13,6 @@ use crate::error::DsmError;
 use crate::images::image_windows::GroundBox;
 use crate::images::scene_image::SceneImage;
 use crate::memory;
-use crate::planning::grid::DsmGrid;
-use crate::sweeping::clean_up::SURROUNDINGS_M;
-use crate::values::HeightRange;
 
 /// Largest side of a chunk, cells: larger ones save little.
 const SIDE_MAX: usize = 8192;

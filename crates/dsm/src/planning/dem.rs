@@ -1,14 +1,12 @@
 //! The heights of a coarse elevation model over the scene.
 
+use reconstruct::{HeightRange, MapBounds, ReconstructError, ViewGeometry, shared_ground};
 use std::path::Path;
 
 use crs::{HeightConverter, MapProjection, VerticalDatum};
 
 use crate::error::{DsmError, DsmSetting};
-use crate::images::footprints::shared_ground;
 use crate::notes::Notes;
-use crate::planning::view_geometry::ViewGeometry;
-use crate::values::{HeightRange, MapBounds};
 
 /// Returns the least and greatest height of an elevation model over the ground that the images
 /// share.
@@ -33,7 +31,7 @@ pub(crate) fn dem_heights(
     };
     let projection = MapProjection::from_definition(dem.crs_wkt.as_deref().ok_or_else(no_crs)?)?;
     let converter = HeightConverter::new(stated.or(dem.vertical).unwrap_or(VerticalDatum::Egm96))?;
-    let hull = shared_ground(&geometry.outlines).ok_or(DsmError::NoOverlap { share_percent: 0.0 })?;
+    let hull = shared_ground(&geometry.outlines).ok_or(ReconstructError::NoOverlap { share_percent: 0.0 })?;
     // The rectangle of cells over the scene, in columns and rows.
     let mut cells = MapBounds::EMPTY;
     for p in hull.exterior().points() {

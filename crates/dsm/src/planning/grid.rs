@@ -3,17 +3,13 @@
 use crs::{AreaOfUse, CrsError, HeightConverter, MapProjection};
 use geo::CoordsIter;
 use geodesy::{metres_per_degree, utm_epsg};
-use raster::{GeoTransform, Window};
+use reconstruct::{DsmGrid, MapBounds, Preset, ReconstructError, ViewGeometry, cell_size, shared_ground, snapped};
 use report::plain_number;
-use serde::{Deserialize, Serialize};
 
-use crate::config::{DsmConfig, LayerArea, Preset};
+use crate::config::{DsmConfig, LayerArea};
 use crate::error::{DsmError, DsmSetting};
-use crate::images::footprints::shared_ground;
+use crate::masks::ground_polygons::read_polygons;
 use crate::notes::Notes;
-use crate::planning::view_geometry::ViewGeometry;
-use crate::sweeping::ground_polygons::read_polygons;
-use crate::values::MapBounds;
 
 /// Beyond this distance from its area of use a CRS needs to be forced, degrees. Scenes at the
 /// border of two UTM zones are written in either, and half a zone beyond it distorts by 2 in 1000.
@@ -27,63 +23,6 @@ const SCALE_TOLERANCE: f64 = 0.01;
 /// Steps along each edge of bounds in another CRS. A bend of an edge between two of them is below a
 /// thousandth of its whole bend, which for a scene of 100 km is below a metre.
 const EDGE_STEPS: usize = 32;
-/// Grids of more cells than this come from a cell size or bounds in wrong units.
-pub(crate) const CELLS_MAX: f64 = 4e9;
-
-/// The grid of a DSM.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-#[non_exhaustive]
-pub struct DsmGrid {
-    /// EPSG code of the horizontal CRS.
-    pub epsg: u32,
-    /// Placement of the cells on the map.
-    pub geotransform: GeoTransform,
-    /// Columns and rows.
-    pub size: (usize, usize),
-    /// Side of a cell on the ground, metres, whatever the unit of the CRS.
-    pub gsd_m: f64,
-}
-
-impl DsmGrid {
-    /// Returns the window of all cells.
-    pub(crate) const fn whole(&self) -> Window {
-        Window::whole(self.size.0, self.size.1)
-    }
-
-    /// Returns the grid of a window of cells.
-    #[must_use]
-    pub(crate) fn part(&self, cells: Window) -> Self {
-        Self {
-            epsg: self.epsg,
-            geotransform: self.geotransform.shifted(cells.x as f64, cells.y as f64),
-            size: (cells.width, cells.height),
-            gsd_m: self.gsd_m,
-        }
-    }
-
-    /// Returns the rectangle that the cells cover.
-    pub(crate) fn bounds(&self) -> MapBounds {
-        let (x_min, y_max) = self.geotransform.map_from_cell(-0.5, -0.5);
-        let (x_max, y_min) = self.geotransform.map_from_cell(self.size.0 as f64 - 0.5, self.size.1 as f64 - 0.5);
-        MapBounds { x_min, y_min, x_max, y_max }
-    }
-
-    /// Returns the middle of the rectangle that the cells cover.
-    fn middle(&self) -> (f64, f64) {
-        let MapBounds { x_min, y_min, x_max, y_max } = self.bounds();
-        (0.5 * (x_min + x_max), 0.5 * (y_min + y_max))
-    }
-
-    /// Makes the projection of the CRS.
-    ///
-    /// # Errors
-    /// [`CrsError::NoTransformation`] for a CRS that PROJ does not know.
-    pub(crate) fn projection(&self) -> Result<MapProjection, CrsError> {
-        MapProjection::from_epsg(self.epsg)
-    }
-}
-
 /// Chooses CRS, cell size and extent where they are not given. `coarsest_gsd_m` is the pixel of the
 /// coarsest image.
 ///
@@ -125,7 +64,7 @@ pub(crate) fn choose_grid(
     if !bounds.meets(covered) {
         return Err(DsmError::BoundsMissScene { bounds, covered, epsg });
     }
-    let (geotransform, size) = snapped(bounds, cell_of(&projection, gsd_m, centre.lat_deg))?;
+    let (geotransform, size) = snapped(bounds, cell_size(&projection, gsd_m, centre.lat_deg))?;
     if config.gsd_m.is_some() && size.0.min(size.1) < SIDE_MIN {
         let found = format!("{gsd_m} m, which gives a grid of {} × {} cells", size.0, size.1);
         let expected = format!(
@@ -276,7 +215,7 @@ fn rounded_gsd_m(gsd_m: f64) -> f64 {
 
 /// Returns the map rectangle of the ground that at least two images see.
 fn covered_bounds(geometry: &ViewGeometry, projection: &MapProjection) -> Result<MapBounds, DsmError> {
-    let hull = shared_ground(&geometry.outlines).ok_or(DsmError::NoOverlap { share_percent: 0.0 })?;
+    let hull = shared_ground(&geometry.outlines).ok_or(ReconstructError::NoOverlap { share_percent: 0.0 })?;
     let mut bounds = MapBounds::EMPTY;
     for p in hull.exterior().points() {
         let g = geometry.frame.ground_from_enu(geodesy::EnuPoint { east: p.x(), north: p.y(), up: 0.0 });
@@ -284,35 +223,4 @@ fn covered_bounds(geometry: &ViewGeometry, projection: &MapProjection) -> Result
         bounds = bounds.including(m.x, m.y);
     }
     Ok(bounds)
-}
-
-/// Returns the width and height of a cell of `gsd_m` in units of the CRS. A cell in degrees is
-/// square on the ground at this latitude and has whole 1e-8 degrees, about a millimetre.
-fn cell_of(projection: &MapProjection, gsd_m: f64, lat_deg: f64) -> (f64, f64) {
-    let (across_m, along_m) = projection.metres_per_unit_at(lat_deg);
-    let cell = (gsd_m / across_m, gsd_m / along_m);
-    if projection.metres_per_unit().is_some() {
-        return cell;
-    }
-    let whole = |degrees: f64| (degrees * 1e8).round().max(1.0) / 1e8;
-    (whole(cell.0), whole(cell.1))
-}
-
-/// Returns a north-up grid on whole multiples of the cell's width and height that holds the bounds:
-/// its geotransform, columns and rows.
-pub(crate) fn snapped(b: MapBounds, (width, height): (f64, f64)) -> Result<(GeoTransform, (usize, usize)), DsmError> {
-    // Slightly inside, so that bounds on the lattice do not gain a cell by rounding.
-    let down = |v: f64, side: f64| ((v + 1e-6 * side) / side).floor() * side;
-    let up = |v: f64, side: f64| ((v / side) - 1e-6).ceil() * side;
-    let (x0, y1) = (down(b.x_min, width), up(b.y_max, height));
-    let columns = ((up(b.x_max, width) - x0) / width).round();
-    let rows = ((y1 - down(b.y_min, height)) / height).round();
-    if !(columns >= 1.0 && rows >= 1.0 && columns * rows <= CELLS_MAX) {
-        return Err(DsmError::value(
-            DsmSetting::Bounds,
-            format!("a grid of {columns:.0} × {rows:.0} cells of {width} × {height} map units"),
-            format!("1 to {CELLS_MAX:.0} cells; bounds are x_min y_min x_max y_max in the DSM's CRS"),
-        ));
-    }
-    Ok((GeoTransform([x0, width, 0.0, y1, 0.0, -height]), (columns as usize, rows as usize)))
 }

@@ -1,14 +1,14 @@
 //! The heights to search: given, from an elevation model, or from the tie points.
 
+use reconstruct::HeightRange;
 use report::plain_number;
 
-use crate::config::{DsmConfig, EARTH_RANGE};
+use crate::config::DsmConfig;
 use crate::error::{DsmError, DsmSetting};
 use crate::notes::Notes;
 use crate::pointing::evidence::dem_with_ties;
 use crate::pointing::point::Pointed;
 use crate::pointing::ties::TIES_MIN;
-use crate::values::HeightRange;
 
 /// Searched below the lowest tie point at least, metres: tie points seldom lie at the bottom of a
 /// pit or courtyard.
@@ -36,7 +36,7 @@ pub(crate) fn choose_heights(
     let (range, reason) = if let Some(given) = config.height_range_m {
         given_heights(given, pointed.tie_heights, notes)?
     } else if let Some(dem) = pointed.dem_heights {
-        if dem.low_m < EARTH_RANGE.low_m || dem.high_m > EARTH_RANGE.high_m {
+        if dem.low_m < HeightRange::EARTH.low_m || dem.high_m > HeightRange::EARTH.high_m {
             return Err(DsmError::value(
                 DsmSetting::Dem,
                 format!("a file with heights from {:.0} to {:.0} m", dem.low_m, dem.high_m),

@@ -2,7 +2,11 @@
 
 use camera::ImageCorrection;
 use io::raster::iso_time;
-use numeric::Choice;
+use numeric::{Choice, Muted};
+use reconstruct::{
+    DsmGrid, HeightRange, ImagePair, SceneSweep, SweepLevels, SweepTuning, ViewGeometry, choose_levels, height_step_m,
+    probe, smallest_sides, widest_parallax,
+};
 use serde::{Deserialize, Serialize};
 
 use crate::config::DsmConfig;
@@ -11,24 +15,19 @@ use crate::images::character::ImageCharacter;
 use crate::images::image_pixels::read_view;
 use crate::images::order::{as_given, in_order_of};
 use crate::images::scene_image::SceneImage;
+use crate::masks::ground_mask::warn_of_masks;
 use crate::memory;
 use crate::notes::Notes;
 use crate::planning::chunk_plan::{ChunkPlan, ChunkPlanner, ChunkSweep, ChunkWork, read_chunk_views};
 use crate::planning::chunk_side::{choose_side, cores, needed_mb};
-use crate::planning::grid::{DsmGrid, choose_grid, note_grid};
+use crate::planning::grid::{choose_grid, note_grid};
 use crate::planning::height_choice::{choose_heights, middle_height_m};
-use crate::planning::levels::{SweepLevels, choose_levels, height_step_m, note_levels, note_step, smallest_sides};
-use crate::planning::probe;
-use crate::planning::sources::{SourceCandidates, choose_sources, widest_parallax};
-use crate::planning::view_geometry::ViewGeometry;
+use crate::planning::sources::{choose_sources, source_candidates};
+use crate::planning::step_notes::{note_levels, note_step};
 use crate::pointing::point::Pointed;
 use crate::pointing::ties::PairTies;
 use crate::report::{ImageReport, PairReport, PointingReport};
-use crate::session::{Muted, Session};
-use crate::sweeping::ground_mask::warn_of_masks;
-use crate::sweeping::scene_sweep::SceneSweep;
-use crate::tuning::SweepTuning;
-use crate::values::{HeightRange, ImagePair};
+use crate::session::Session;
 
 /// Third stage of a run: everything that is needed to compute the chunks and to merge them.
 ///
@@ -111,7 +110,7 @@ impl Plan {
 /// [`DsmError::NoTies`], [`DsmError::RangeMissesScene`], [`DsmError::BoundsMissScene`],
 /// [`DsmError::Value`], [`DsmError::Memory`] for a request that cannot be served;
 /// [`DsmError::Prior`], [`DsmError::Image`], [`DsmError::Camera`], [`DsmError::Crs`],
-/// [`DsmError::Sweep`]; [`DsmError::Cancelled`].
+/// [`DsmError::Reconstruct`]; [`DsmError::Cancelled`].
 pub fn plan(config: &DsmConfig, pointed: &Pointed, session: &mut Session<'_>) -> Result<Plan, DsmError> {
     session.progress.check_cancelled()?;
     if config.reference_dem.is_some() && pointed.pointing.reference.is_none() {
@@ -125,8 +124,9 @@ pub fn plan(config: &DsmConfig, pointed: &Pointed, session: &mut Session<'_>) ->
     notes.warnings.extend(images.iter().flat_map(|image| image.doubts.iter().cloned()));
     let (given, config) = (config, &in_order_of(config, images));
     let range = choose_heights(config, pointed, &mut notes)?;
-    let geometry = ViewGeometry::at(images, middle_height_m(pointed.tie_heights, range))?;
-    let gsds_m: Vec<Option<f64>> = (0..images.len()).map(|i| geometry.ground_sampling_m(&images[i], i)).collect();
+    let geometry = SceneImage::geometry(images, middle_height_m(pointed.tie_heights, range))?;
+    let gsds_m: Vec<Option<f64>> =
+        (0..images.len()).map(|i| geometry.ground_sampling_m(&images[i].camera, i)).collect();
     let pixel_m = gsds_m.iter().flatten().copied().fold(0.0, f64::max);
     let grid = choose_grid(config, &geometry, pixel_m)?;
     note_grid(config, &grid, pixel_m, &mut notes);
@@ -268,7 +268,7 @@ impl PlannedScene<'_> {
             characters: &self.pointed.characters,
             grid: self.grid,
             projection: &self.grid.projection()?,
-            candidates: SourceCandidates::of(config, self.geometry, self.pointed, self.tuning),
+            candidates: source_candidates(config, self.geometry, self.pointed, self.tuning),
             geometry: self.geometry,
             step_m: self.step_m,
             pixel_m: self.pixel_m,

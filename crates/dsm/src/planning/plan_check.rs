@@ -6,6 +6,10 @@
 //! levels and memory with the windows, steps with the cameras. What remains are measurements that
 //! nothing else in the plan tells, such as noise. They are bounded.
 
+use reconstruct::{
+    CELLS_MAX, DsmGrid, HeightRange, ImagePair, PYRAMID_LEVELS_MAX, choose_levels, pair_geometry, smallest_sides,
+    snapped,
+};
 use std::collections::{BTreeMap, BTreeSet};
 
 use camera::{ImageCorrection, RpcCamera};
@@ -23,12 +27,9 @@ use crate::images::scene_image::SceneImage;
 use crate::memory;
 use crate::planning::chunk_plan::{ChunkSweep, ChunkWork};
 use crate::planning::chunk_side::{MARGIN_PX, aligned, with_rim};
-use crate::planning::grid::{CELLS_MAX, DsmGrid, asked_bounds, snapped};
-use crate::planning::levels::{PYRAMID_LEVELS_MAX, choose_levels, smallest_sides};
+use crate::planning::grid::asked_bounds;
 use crate::planning::plan::{Plan, PlanReport};
-use crate::planning::view_geometry::pair_geometry;
 use crate::report::{PointingReport, ReferenceReport};
-use crate::values::{HeightRange, ImagePair};
 
 /// Heights that no plan searches, metres: twice the lowest and the highest ground, for the ranges
 /// of chunks are widened by half a span and by towers.
@@ -82,7 +83,7 @@ impl Plan {
     pub(crate) fn check(&self) -> Checked {
         self.config.validate().map_err(|e| format!("its configuration is wrong: {e}"))?;
         self.check_images()?;
-        let projection = self.grid.check()?;
+        let projection = check_grid(&self.grid)?;
         self.check_grid_choice()?;
         check_range("the height range", self.height_range)?;
         ensure(self.tuning == self.config.preset.tuning(), || {
@@ -158,7 +159,7 @@ impl Plan {
             format!("the corner {x}, {y} of the grid is no whole multiple of its cells")
         })?;
         let asked = grid.projection().map_err(DsmError::from).and_then(|map| asked_bounds(config, &map));
-        let asked = asked.and_then(|asked| asked.map(|bounds| snapped(bounds, (width, -height))).transpose());
+        let asked = asked.and_then(|asked| asked.map(|bounds| Ok(snapped(bounds, (width, -height))?)).transpose());
         ensure(asked.is_ok_and(|asked| asked.is_none_or(|asked| asked == (grid.geotransform, grid.size))), || {
             format!("the grid {:?} is not that of the bounds in the configuration", grid.bounds().to_array())
         })?;
@@ -255,35 +256,33 @@ impl ImageCharacter {
     }
 }
 
-impl DsmGrid {
-    /// Returns the projection of the grid, whose cells are as wide as said and lie on the map.
-    fn check(&self) -> Result<MapProjection, String> {
-        let projection = self.projection().map_err(|e| e.to_string())?;
-        let (columns, rows) = self.size;
-        let cells = columns as f64 * rows as f64;
-        ensure((1.0..=CELLS_MAX).contains(&cells), || {
-            format!("the grid has {columns} × {rows} cells, expected 1 to {CELLS_MAX:.0}")
+/// Returns the projection of the grid, whose cells are as wide as said and lie on the map.
+fn check_grid(grid: &DsmGrid) -> Result<MapProjection, String> {
+    let projection = grid.projection().map_err(|e| e.to_string())?;
+    let (columns, rows) = grid.size;
+    let cells = columns as f64 * rows as f64;
+    ensure((1.0..=CELLS_MAX).contains(&cells), || {
+        format!("the grid has {columns} × {rows} cells, expected 1 to {CELLS_MAX:.0}")
+    })?;
+    let [x, width, turn_x, y, turn_y, height] = grid.geotransform.0;
+    let is_north_up = width > 0.0 && height < 0.0 && turn_x == 0.0 && turn_y == 0.0;
+    ensure(is_north_up && [x, y, width, height].iter().all(|v| v.is_finite()), || {
+        format!("the grid is not north up: its geotransform is {:?}", grid.geotransform.0)
+    })?;
+    let bounds = grid.bounds();
+    let corners = [(bounds.x_min, bounds.y_min), (bounds.x_max, bounds.y_max)];
+    let [low, high] = corners.map(|(x, y)| projection.lonlat_from_map(x, y));
+    let (low, high) = (low.map_err(|e| e.to_string())?, high.map_err(|e| e.to_string())?);
+    let is_in_degrees = projection.metres_per_unit().is_none();
+    let tolerance = if is_in_degrees { CELL_TOLERANCE_DEGREES } else { CELL_TOLERANCE };
+    let (across_m, along_m) = projection.metres_per_unit_at(0.5 * (low.1 + high.1));
+    for (side, metres) in [(width, across_m), (-height, along_m)] {
+        let share = side * metres / grid.gsd_m;
+        ensure((share - 1.0).abs() <= tolerance, || {
+            format!("cells are {} m wide by the map, and {} m as said", side * metres, grid.gsd_m)
         })?;
-        let [x, width, turn_x, y, turn_y, height] = self.geotransform.0;
-        let is_north_up = width > 0.0 && height < 0.0 && turn_x == 0.0 && turn_y == 0.0;
-        ensure(is_north_up && [x, y, width, height].iter().all(|v| v.is_finite()), || {
-            format!("the grid is not north up: its geotransform is {:?}", self.geotransform.0)
-        })?;
-        let bounds = self.bounds();
-        let corners = [(bounds.x_min, bounds.y_min), (bounds.x_max, bounds.y_max)];
-        let [low, high] = corners.map(|(x, y)| projection.lonlat_from_map(x, y));
-        let (low, high) = (low.map_err(|e| e.to_string())?, high.map_err(|e| e.to_string())?);
-        let is_in_degrees = projection.metres_per_unit().is_none();
-        let tolerance = if is_in_degrees { CELL_TOLERANCE_DEGREES } else { CELL_TOLERANCE };
-        let (across_m, along_m) = projection.metres_per_unit_at(0.5 * (low.1 + high.1));
-        for (side, metres) in [(width, across_m), (-height, along_m)] {
-            let share = side * metres / self.gsd_m;
-            ensure((share - 1.0).abs() <= tolerance, || {
-                format!("cells are {} m wide by the map, and {} m as said", side * metres, self.gsd_m)
-            })?;
-        }
-        Ok(projection)
     }
+    Ok(projection)
 }
 
 fn check_range(name: &str, range: HeightRange) -> Checked {

@@ -7,12 +7,12 @@
 //! heights for which the RPCs were not made.
 
 use camera::RpcCamera;
+use reconstruct::HeightRange;
 use sweep::pointing::{Tie, off_trajectory};
 
 use crate::error::DsmError;
 use crate::images::scene_image::SceneImage;
 use crate::notes::Notes;
-use crate::values::HeightRange;
 
 /// True ties of a pair lie in a band of this width across their trajectories, pixels: the drift of
 /// a sensor over an image and the errors of matching. Chance fills the whole band of the search,

@@ -36,8 +36,8 @@ pub(crate) fn grossly_off(corrections: &[ImageCorrection]) -> Vec<(usize, f64)> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::values::ImagePair;
     use camera::ImagePoint;
+    use reconstruct::ImagePair;
     use sweep::pointing::Tie;
 
     fn ties(first: usize, second: usize, apart_px: f64) -> PairTies {

@@ -9,9 +9,10 @@
 
 use camera::RpcCamera;
 use raster::Window;
+use reconstruct::{DsmGrid, HeightRange, ImagePair, Preset, ViewGeometry};
 use sweep::pointing::TieConfig;
 
-use crate::config::{DsmConfig, Preset};
+use crate::config::DsmConfig;
 use crate::error::{DsmError, DsmSetting};
 use crate::images::character::ImageCharacter;
 use crate::images::image_pixels::read_views;
@@ -19,14 +20,12 @@ use crate::images::order::as_given;
 use crate::images::scene_image::SceneImage;
 use crate::memory;
 use crate::planning::chunk_side::{choose_side, needed_mb};
-use crate::planning::grid::{DsmGrid, choose_grid};
-use crate::planning::view_geometry::ViewGeometry;
+use crate::planning::grid::choose_grid;
 use crate::pointing::partners::tie_pairs;
 use crate::pointing::shared_heights::{SharedHeights, validity_range};
 use crate::pointing::tie_windows::match_in_windows;
 use crate::pointing::ties::{PairTies, TIES_MIN, match_pairs};
 use crate::session::Session;
-use crate::values::{HeightRange, ImagePair};
 
 /// Images of up to this many pixels in all are matched as a whole, larger ones in windows. The
 /// windows of eight images, which are read at once, have as many pixels, so that neither way takes
@@ -59,7 +58,7 @@ impl FirstLook {
 /// Reads the images and matches them.
 ///
 /// # Errors
-/// Those of the geometry ([`DsmError::NoOverlap`], [`DsmError::NoParallax`], [`DsmError::Camera`]),
+/// Those of the geometry ([`DsmError::Reconstruct`], [`DsmError::Camera`]),
 /// of the request ([`DsmError::Value`], [`DsmError::BoundsMissScene`], [`DsmError::Memory`]),
 /// [`DsmError::Image`], [`DsmError::Cancelled`].
 pub(crate) fn look(
@@ -69,7 +68,7 @@ pub(crate) fn look(
 ) -> Result<FirstLook, DsmError> {
     let guess = images.iter().map(|o| o.camera.rpc.height_off).sum::<f64>() / images.len() as f64;
     let valid = validity_range(images, config.height_range_m);
-    let expected = ViewGeometry::at(images, guess.clamp(valid.low_m, valid.high_m));
+    let expected = SceneImage::geometry(images, guess.clamp(valid.low_m, valid.high_m));
     let looked = expected.and_then(|geometry| look_at(config, images, geometry, valid, session));
     let has_ties = |l: &Result<FirstLook, DsmError>| l.as_ref().is_ok_and(FirstLook::has_ties);
     let is_final = |e: &DsmError| matches!(e, DsmError::Image(_) | DsmError::Memory { .. } | DsmError::Cancelled);
@@ -79,7 +78,7 @@ pub(crate) fn look(
     let is_wider = |s: &SharedHeights| s.range.low_m < valid.low_m || s.range.high_m > valid.high_m;
     let Some(shared) = SharedHeights::of(images).filter(is_wider) else { return looked };
     let views = session.views.take();
-    let again = ViewGeometry::at(images, shared.best_m)
+    let again = SceneImage::geometry(images, shared.best_m)
         .and_then(|geometry| look_at(config, images, geometry, shared.range, session));
     if has_ties(&again) || matches!(again, Err(DsmError::Cancelled)) {
         return again;
@@ -100,7 +99,7 @@ fn look_at(
     let useful = geometry.useful_pairs()?;
     let asked = asked_pairs(config, images, &useful)?;
     let pairs = if config.pairs.is_some() { asked } else { tie_pairs(images, &geometry, &asked) };
-    let gsds = images.iter().enumerate().filter_map(|(i, image)| geometry.ground_sampling_m(image, i));
+    let gsds = images.iter().enumerate().filter_map(|(i, image)| geometry.ground_sampling_m(&image.camera, i));
     let gsd = gsds.fold(0.0, f64::max);
     let grid = choose_grid(config, &geometry, gsd)?;
     let progress = session.progress;

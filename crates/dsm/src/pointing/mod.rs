@@ -1,6 +1,5 @@
 //! Tie points, the correction of the cameras, and what both tell about the images.
 
-pub(super) mod covering;
 pub(super) mod evidence;
 pub(super) mod image_checks;
 pub(super) mod look;

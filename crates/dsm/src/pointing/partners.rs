@@ -7,11 +7,9 @@
 //! separates two parts of the block.
 
 use geo::Polygon;
+use reconstruct::{ImagePair, Places, ViewGeometry, angle_merit};
 
 use crate::images::scene_image::SceneImage;
-use crate::planning::view_geometry::{ViewGeometry, angle_merit};
-use crate::pointing::covering::Places;
-use crate::values::ImagePair;
 
 /// Up to this many pairs, those of eight images, all are searched.
 pub(crate) const ALL_MAX: usize = 28;

@@ -2,6 +2,7 @@
 
 use camera::ImageCorrection;
 use numeric::Choice;
+use reconstruct::{HeightRange, ImagePair, ViewGeometry};
 use serde::{Deserialize, Serialize};
 use sweep::SweepView;
 use sweep::pointing::{AdjustConfig, Adjustment, ModelOrder, Track, adjust};
@@ -16,7 +17,6 @@ use crate::images::order::{as_given, in_order_of};
 use crate::images::scene_image::SceneImage;
 use crate::notes::{LISTED_MAX, Notes};
 use crate::planning::dem::dem_heights;
-use crate::planning::view_geometry::ViewGeometry;
 use crate::pointing::evidence::warn_of_domains;
 use crate::pointing::image_checks::{grossly_off, unconnected};
 use crate::pointing::look::{FirstLook, asked_pairs, look, pair_names};
@@ -28,7 +28,6 @@ use crate::pointing::tie_quality::{by_image, warn_of_images, warn_of_residual};
 use crate::pointing::ties::{PairTies, TIES_MIN, join_pairs, tie_heights};
 use crate::report::{CorrectionOrder, PointingReport};
 use crate::session::Session;
-use crate::values::{HeightRange, ImagePair};
 use job::corrections::Corrections;
 
 /// Where no two views are further apart than this, heights are ten times less precise than
@@ -72,7 +71,7 @@ pub struct Pointed {
 /// corrects the cameras.
 ///
 /// # Errors
-/// [`DsmError::NoOverlap`], [`DsmError::NoParallax`], [`DsmError::Blank`], [`DsmError::SamePixels`]
+/// [`DsmError::Reconstruct`], [`DsmError::Blank`], [`DsmError::SamePixels`]
 /// for images that give no heights; [`DsmError::NoPointing`] for too few tie points;
 /// [`DsmError::Value`], [`DsmError::BoundsMissScene`], [`DsmError::Memory`] for a request that
 /// cannot be served; [`DsmError::Image`], [`DsmError::Camera`], [`DsmError::Crs`],

@@ -14,14 +14,13 @@
 use numeric::upper_median;
 use raster::{Grid, Window, reduce};
 use rayon::prelude::*;
+use reconstruct::{ImagePair, ViewGeometry};
 use sweep::SweepView;
 
 use crate::error::DsmError;
 use crate::images::image_pixels::read_view;
 use crate::images::scene_image::SceneImage;
-use crate::planning::view_geometry::ViewGeometry;
 use crate::pointing::ties::{PairTies, TIES_MIN};
-use crate::values::ImagePair;
 
 /// Side of the squares that are searched for, pixels: wide enough to hold detail of its own when it
 /// is reduced to [`COARSE`].
@@ -305,7 +304,7 @@ mod tests {
         let paths = ["view_1.tif", "view_3.tif"].map(|name| town.join(name));
         let images = open(&DsmConfig::new(paths.into(), "unused".into())).unwrap().images;
         let views = read_views(&images, &|| ()).unwrap();
-        let geometry = ViewGeometry::at(&images, images[0].camera.rpc.height_off).unwrap();
+        let geometry = SceneImage::geometry(&images, images[0].camera.rpc.height_off).unwrap();
         (images, geometry, views)
     }
 
@@ -338,7 +337,7 @@ mod tests {
         let mut elsewhere = images[0].clone();
         elsewhere.camera.rpc.long_off += 0.05;
         let apart = [images[0].clone(), elsewhere, images[1].clone()];
-        let far = ViewGeometry::at(&apart, images[0].camera.rpc.height_off).unwrap();
+        let far = SceneImage::geometry(&apart, images[0].camera.rpc.height_off).unwrap();
         let pixels = [views[0].clone(), views[0].clone(), views[1].clone()];
         assert_eq!(same_picture(&apart, &far, Some(&pixels)).unwrap(), None);
         let cut = Window { x: 37, y: 21, width: original.width() - 37, height: original.height() - 21 };

@@ -5,11 +5,9 @@
 //! not (crops, fits to flat ground, coefficients of another block). Two images from different
 //! directions share ground only within some heights, which bounds the search in any case.
 
-use crate::config::EARTH_RANGE;
-use crate::images::footprints::{footprint, local_polygon, overlap_share};
+use reconstruct::{HeightRange, OVERLAP_MIN, footprint, local_polygon, overlap_share};
+
 use crate::images::scene_image::SceneImage;
-use crate::planning::view_geometry::OVERLAP_MIN;
-use crate::values::HeightRange;
 
 /// Distance of the heights that are looked at, metres. Footprints move by tens of metres over it.
 const STEP_M: f64 = 50.0;
@@ -25,13 +23,13 @@ pub(crate) struct SharedHeights {
 impl SharedHeights {
     /// Looks at all pairs of images; `None` when no two share ground at any height.
     pub(crate) fn of(images: &[SceneImage]) -> Option<Self> {
-        let steps = (EARTH_RANGE.span_m() / STEP_M) as usize;
-        let heights = (0..=steps).map(|i| EARTH_RANGE.low_m + STEP_M * i as f64);
+        let steps = (HeightRange::EARTH.span_m() / STEP_M) as usize;
+        let heights = (0..=steps).map(|i| HeightRange::EARTH.low_m + STEP_M * i as f64);
         let shared: Vec<(f64, f64)> =
             heights.map(|h| (h, largest_overlap(images, h))).filter(|(_, s)| *s >= OVERLAP_MIN).collect();
         let (first, last) = (shared.first()?.0, shared.last()?.0);
         let best_m = shared.iter().max_by(|a, b| a.1.total_cmp(&b.1))?.0;
-        Some(Self { best_m, range: HeightRange::new(first, last).grown(STEP_M, STEP_M).cut_to(EARTH_RANGE) })
+        Some(Self { best_m, range: HeightRange::new(first, last).grown(STEP_M, STEP_M).cut_to(HeightRange::EARTH) })
     }
 }
 
@@ -43,8 +41,8 @@ pub(crate) fn validity_range(images: &[SceneImage], asked: Option<HeightRange>) 
         HeightRange::new(r.height_off - r.height_scale.abs(), r.height_off + r.height_scale.abs())
     });
     let nothing = HeightRange::new(f64::INFINITY, f64::NEG_INFINITY);
-    let range = ranges.chain(asked).fold(nothing, HeightRange::union).cut_to(EARTH_RANGE);
-    if range.low_m < range.high_m { range } else { EARTH_RANGE }
+    let range = ranges.chain(asked).fold(nothing, HeightRange::union).cut_to(HeightRange::EARTH);
+    if range.low_m < range.high_m { range } else { HeightRange::EARTH }
 }
 
 /// Returns the largest share of ground that two of the images have in common at a height; 0 where

@@ -13,22 +13,19 @@ use geo::{Area, Polygon};
 use numeric::Progress;
 use raster::Window;
 use rayon::prelude::*;
+use reconstruct::{DsmGrid, HeightRange, ImagePair, ViewGeometry, shared_part};
 use sweep::SweepView;
 use sweep::pointing::{Tie, TieConfig};
 
 use crate::error::DsmError;
 use crate::images::character::ImageCharacter;
-use crate::images::footprints::shared_part;
 use crate::images::image_pixels::read_view;
 use crate::images::image_windows::GroundBox;
 use crate::images::scene_image::SceneImage;
 use crate::planning::chunk_side::cores;
-use crate::planning::grid::DsmGrid;
-use crate::planning::view_geometry::ViewGeometry;
 use crate::pointing::evidence::is_beyond_chance;
 use crate::pointing::partners::ALL_MAX;
 use crate::pointing::ties::{PairTies, TIES_MIN, heights_seen, match_pairs};
-use crate::values::{HeightRange, ImagePair};
 
 /// Side of a window on the ground, cells of the grid.
 const SIDE: usize = 1024;

@@ -1,6 +1,7 @@
 //! Tie points over the pairs of views and the joint correction of all cameras.
 
 use camera::RpcCamera;
+use reconstruct::{HeightRange, ImagePair};
 use serde::{Deserialize, Serialize};
 use sweep::SweepView;
 use sweep::pointing::{
@@ -9,7 +10,6 @@ use sweep::pointing::{
 };
 
 use crate::pointing::evidence::is_beyond_chance;
-use crate::values::{HeightRange, ImagePair};
 
 /// Fewer tie points than this do not determine the heights of a scene.
 pub(crate) const TIES_MIN: usize = 12;

@@ -1,5 +1,6 @@
 //! A city model as the prior of the height sweep.
 
+use reconstruct::{DsmGrid, MapBounds, ViewPrior};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
@@ -13,9 +14,6 @@ use sweep::SweepView;
 
 use crate::error::DsmError;
 use crate::notes::Notes;
-use crate::planning::grid::DsmGrid;
-use crate::prior::prior_view::ViewPrior;
-use crate::values::MapBounds;
 
 #[derive(Debug, thiserror::Error)]
 enum Cause {

@@ -9,40 +9,27 @@ use std::path::{Path, PathBuf};
 
 use crs::{Crs, HeightConverter, VerticalDatum};
 use io::raster::{Band, BandData, CogPlace, CogRaster, Provenance, RasterSpool, SpoolBand, write_cog};
-use raster::{Grid, NO_DATA, Window};
+use raster::{Grid, Window};
+use reconstruct::{DsmGrid, SurfaceRasters};
 use tempfile::TempDir;
 
-use crate::chunks::rasters::ChunkRasters;
 use crate::config::DsmConfig;
 use crate::error::DsmError;
-use crate::planning::grid::DsmGrid;
 use crate::products::remove_products;
 use crate::report::{DsmReport, ImageReport};
 use crate::stac::{AssetKind, StacAsset, StacRasters, item_and_collection};
+use crate::writing::layers::{HEIGHTS, LAYERS, Layer};
 use crate::writing::page;
-use crate::writing::pictures::{Layer, ReadLayer, RunMaps, write_pictures};
+use crate::writing::pictures::{ReadLayer, RunMaps, write_pictures};
 use job::files::{FileError, create_folder, write_json};
 use job::job_paths::relative;
 use job::output_folder::OutputFolder;
 use job::run_links;
 use surfaces::eval::remove_evaluation;
-use surfaces::surface_layer::VOID;
 
-/// Files of a run, relative to its folder. The report is the last to appear: a folder with a report
-/// is complete.
-pub const FILES: [&str; 23] = [
-    "dsm/dsm.tif",
-    "dsm/sigma.tif",
-    "dsm/views.tif",
-    "dsm/filled.tif",
-    "dsm/source.tif",
-    "dsm/confidence.tif",
-    "dsm/dsm.qml",
-    "dsm/sigma.qml",
-    "dsm/views.qml",
-    "dsm/filled.qml",
-    "dsm/source.qml",
-    "dsm/confidence.qml",
+/// Files of a run beside its rasters and their styles. The report is the last to appear: a folder
+/// with a report is complete.
+const OTHERS: [&str; 11] = [
     "dsm/hillshade.png",
     "dsm/hillshade.pgw",
     "dsm/relief.png",
@@ -55,37 +42,29 @@ pub const FILES: [&str; 23] = [
     PAGE,
     "report/report.json",
 ];
+/// Files of a run, relative to its folder, in the order in which they appear.
+pub const FILES: [&str; 2 * LAYERS.len() + OTHERS.len()] = {
+    let mut files = [""; 2 * LAYERS.len() + OTHERS.len()];
+    let mut at = 0;
+    while at < LAYERS.len() {
+        (files[at], files[LAYERS.len() + at]) = (LAYERS[at].raster, LAYERS[at].style);
+        at += 1;
+    }
+    at = 0;
+    while at < OTHERS.len() {
+        files[2 * LAYERS.len() + at] = OTHERS[at];
+        at += 1;
+    }
+    files
+};
 const PAGE: &str = "report/report.html";
 /// Configuration of the run, as a job file.
 pub const USED_CONFIG: &str = "used_config.toml";
 
-/// The only raster of heights.
-const HEIGHTS: &str = "dsm.tif";
-
-/// Names and contents of the rasters, in the order of [`bands`] and of [`Layer`].
-const BANDS: [(&str, SpoolBand<'static>); 6] = [
-    (HEIGHTS, SpoolBand { description: "height_m", is_float: true, no_data: NO_DATA as f64 }),
-    ("sigma.tif", SpoolBand { description: "height_standard_deviation_m", is_float: true, no_data: NO_DATA as f64 }),
-    ("views.tif", SpoolBand { description: "number_of_views", is_float: false, no_data: 0.0 }),
-    ("confidence.tif", SpoolBand { description: "confidence_0_to_1", is_float: true, no_data: NO_DATA as f64 }),
-    ("filled.tif", SpoolBand { description: "1_filled_0_observed", is_float: false, no_data: VOID as f64 }),
-    ("source.tif", SpoolBand { description: SOURCE_CODES, is_float: false, no_data: 0.0 }),
-];
-/// Description of the codes of [`sweep::fusion::CellSource`].
-const SOURCE_CODES: &str = "0_outside_1_observed_2_filled_hidden_3_filled_surface_4_filled_narrow_5_filled_street_\
-                            10_void_unmatched_11_void_blank_12_void_hidden_13_void_masked";
-
-/// Returns the contents of the rasters in the order of [`BANDS`]; `heights` come from
+/// Returns the contents of the rasters in the order of [`LAYERS`]; `heights` come from
 /// [`absolute_heights`].
-fn bands<'a>(rasters: &'a ChunkRasters, heights: &'a Grid<f32>) -> [BandData<'a>; 6] {
-    [
-        BandData::F32(heights),
-        BandData::F32(&rasters.sigma_m),
-        BandData::U8(&rasters.views),
-        BandData::F32(&rasters.confidence),
-        BandData::U8(&rasters.filled),
-        BandData::U8(&rasters.source),
-    ]
+fn bands<'a>(rasters: &'a SurfaceRasters, heights: &'a Grid<f32>) -> [BandData<'a>; LAYERS.len()] {
+    LAYERS.each_ref().map(|layer| (layer.cells)(rasters, heights))
 }
 
 /// The output folder of a run, with the work folder in which its files are made. Dropping it before
@@ -171,16 +150,16 @@ pub(crate) fn write_whole(
     folder: &DsmFolder,
     config: &DsmConfig,
     grid: &DsmGrid,
-    rasters: &ChunkRasters,
+    rasters: &SurfaceRasters,
     report: &DsmReport,
 ) -> Result<(), DsmError> {
     let heights = absolute_heights(grid, config.vertical, rasters)?;
     let parts = bands(rasters, &heights);
     // What a raster gives for its no-data value must not depend on where it is read.
-    let read = |layer: Layer, window: Window| Ok(cells_of(&parts[layer as usize], no_data_of(layer), window));
+    let read = |layer: usize, window: Window| Ok(cells_of(&parts[layer], LAYERS[layer].band().no_data as f32, window));
     let (looks, written) = rayon::join(
         || write_looks(folder, config, grid, report, &read),
-        || write_rasters(&folder.dsm(), config.vertical, grid, &parts, &provenance(report)),
+        || write_rasters(folder.work.path(), config.vertical, grid, &parts, &provenance(report)),
     );
     looks.and(written)?;
     write_texts(folder, config, report)?;
@@ -199,11 +178,6 @@ fn cells_of(data: &BandData<'_>, no_data: f32, window: Window) -> Grid<f32> {
     }
 }
 
-/// Returns the no-data value of a raster.
-fn no_data_of(layer: Layer) -> f32 {
-    BANDS[layer as usize].1.no_data as f32
-}
-
 /// Writes what people look at: pictures, styles, the page and the STAC item.
 fn write_looks(
     folder: &DsmFolder,
@@ -215,7 +189,7 @@ fn write_looks(
     let (dsm, root) = (folder.dsm(), folder.work.path());
     write_pictures(&dsm, grid, read)?;
     let maps = RunMaps::read(grid, read)?;
-    maps.write_styles(&dsm)?;
+    maps.write_styles(root)?;
     let crs = Crs { horizontal: grid.epsg, vertical: config.vertical };
     let links = run_links::links("../", PAGE, |name| FILES.contains(&name));
     let page = page::html(config, report, (&crs, grid.gsd_m), &maps, links)
@@ -226,31 +200,18 @@ fn write_looks(
     Ok(write_json(&root.join("stac/collection.json"), &collection, false)?)
 }
 
-/// Returns what a raster holds, in words.
-fn layer_title(name: &str) -> &'static str {
-    match name {
-        HEIGHTS => "Heights of the upper surface",
-        "sigma.tif" => "Standard deviation of the heights",
-        "views.tif" => "Number of views behind each height",
-        "confidence.tif" => "Probability that the height is right",
-        "filled.tif" => "Filled cells",
-        _ => "Where each height comes from",
-    }
-}
-
 /// Returns the files of a run as an item of STAC.
 fn stac_rasters<'a>(config: &DsmConfig, grid: &DsmGrid, report: &DsmReport, crs: &Crs) -> StacRasters<'a> {
     let mut assets: Vec<StacAsset<'a>> = Vec::new();
-    for (name, band) in BANDS {
-        let stem = name.trim_end_matches(".tif");
-        let unit = if band.description.ends_with("_m") { "m" } else { "" };
-        let data_type = if band.is_float { "float32" } else { "uint8" };
+    for (place, layer) in LAYERS.iter().enumerate() {
+        let SpoolBand { description, is_float, no_data } = layer.band();
+        let data_type = if is_float { "float32" } else { "uint8" };
         assets.push(StacAsset {
-            name: stem,
-            path: format!("../dsm/{name}"),
-            title: layer_title(name).to_owned(),
-            role: if name == HEIGHTS { "data" } else { "metadata" },
-            kind: AssetKind::Cog { band: band.description, data_type, no_data: band.no_data, unit },
+            name: layer.stem,
+            path: format!("../{}", layer.raster),
+            title: layer.title.to_owned(),
+            role: if place == HEIGHTS { "data" } else { "metadata" },
+            kind: AssetKind::Cog { band: description, data_type, no_data, unit: layer.unit },
         });
     }
     let other = |name, path: &str, title: &str, role, kind| StacAsset {
@@ -289,13 +250,11 @@ impl<'a> ChunkedOutput<'a> {
     /// # Errors
     /// [`DsmError::Output`] also for a disk with too little space; [`DsmError::Image`].
     pub(crate) fn begin(folder: DsmFolder, config: &'a DsmConfig, grid: &'a DsmGrid) -> Result<Self, DsmError> {
-        let cell_bytes: u64 = BANDS.iter().map(|(_, band)| if band.is_float { 4 } else { 1 }).sum();
+        let cell_bytes: u64 = LAYERS.iter().map(|layer| if layer.band().is_float { 4 } else { 1 }).sum();
         let needed_bytes = grid.size.0 as u64 * grid.size.1 as u64 * cell_bytes;
         io::atomic::require_space(&config.output, needed_bytes).map_err(FileError::from)?;
-        let mut spools = Vec::with_capacity(BANDS.len());
-        for (name, band) in BANDS {
-            spools.push(RasterSpool::create(folder.spool(name), grid.size, band)?);
-        }
+        let spool = |layer: &Layer| RasterSpool::create(folder.spool(layer.stem), grid.size, layer.band());
+        let spools = LAYERS.iter().map(spool).collect::<Result<_, _>>()?;
         Ok(Self { config, grid, spools, folder })
     }
 
@@ -303,7 +262,7 @@ impl<'a> ChunkedOutput<'a> {
     ///
     /// # Errors
     /// [`DsmError::Image`], [`DsmError::Crs`].
-    pub(crate) fn put(&mut self, core: Window, rasters: &ChunkRasters) -> Result<(), DsmError> {
+    pub(crate) fn put(&mut self, core: Window, rasters: &SurfaceRasters) -> Result<(), DsmError> {
         let heights = absolute_heights(&self.grid.part(core), self.config.vertical, rasters)?;
         for (spool, cells) in self.spools.iter_mut().zip(bands(rasters, &heights)) {
             spool.put((core.x as usize, core.y as usize), cells)?;
@@ -317,15 +276,15 @@ impl<'a> ChunkedOutput<'a> {
     /// [`DsmError::Output`], [`DsmError::Image`].
     pub(crate) fn finish(self, report: &DsmReport) -> Result<(), DsmError> {
         let Self { config, grid, spools, folder } = self;
-        let read = |layer: Layer, window: Window| Ok(spools[layer as usize].read(window)?);
+        let read = |layer: usize, window: Window| Ok(spools[layer].read(window)?);
         write_looks(&folder, config, grid, report, &read)?;
         let crs = Crs { horizontal: grid.epsg, vertical: config.vertical };
         let geotransform = grid.geotransform;
         let provenance = provenance(report);
-        for ((name, _), spool) in BANDS.iter().zip(spools) {
-            let holds_heights = *name == HEIGHTS;
+        for (place, spool) in spools.into_iter().enumerate() {
+            let holds_heights = place == HEIGHTS;
             let threads = rayon::current_num_threads();
-            let place = CogPlace {
+            let to = CogPlace {
                 geotransform,
                 crs: crs.into(),
                 holds_heights,
@@ -333,7 +292,7 @@ impl<'a> ChunkedOutput<'a> {
                 metadata: &[],
                 threads,
             };
-            spool.into_cog(folder.dsm().join(name), place, false)?;
+            spool.into_cog(folder.work.path().join(LAYERS[place].raster), to, false)?;
         }
         write_texts(&folder, config, report)?;
         folder.publish()
@@ -363,18 +322,23 @@ fn write_rasters(
     provenance: &Provenance,
 ) -> Result<(), DsmError> {
     let crs = Crs { horizontal: grid.epsg, vertical };
-    for ((name, band), data) in BANDS.iter().zip(parts) {
-        let bands = [Band { description: band.description, data: *data }];
-        let holds_heights = *name == HEIGHTS;
+    for (place, (layer, data)) in LAYERS.iter().zip(parts).enumerate() {
+        let SpoolBand { description, no_data, .. } = layer.band();
+        let bands = [Band { description, data: *data }];
         let plain = CogRaster::new(&bands, grid.geotransform, crs);
-        let raster = CogRaster { no_data: Some(band.no_data), holds_heights, provenance: Some(provenance), ..plain };
-        write_cog(folder.join(name), &raster, false)?;
+        let raster = CogRaster {
+            no_data: Some(no_data),
+            holds_heights: place == HEIGHTS,
+            provenance: Some(provenance),
+            ..plain
+        };
+        write_cog(folder.join(layer.raster), &raster, false)?;
     }
     Ok(())
 }
 
 /// Returns heights above the vertical datum, as they are written; NaN in voids.
-fn absolute_heights(grid: &DsmGrid, vertical: VerticalDatum, rasters: &ChunkRasters) -> Result<Grid<f32>, DsmError> {
+fn absolute_heights(grid: &DsmGrid, vertical: VerticalDatum, rasters: &SurfaceRasters) -> Result<Grid<f32>, DsmError> {
     let mut out = rasters.height_m.map(|h| written(f64::from(*h) + rasters.origin_m));
     if vertical == VerticalDatum::Ellipsoid {
         return Ok(out);

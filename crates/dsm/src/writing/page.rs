@@ -51,7 +51,7 @@ pub(crate) fn html(
         cards: vec![
             (share(surface.observed), "of the cells observed"),
             (share(surface.filled), "filled, hatched on the maps"),
-            (median_text(&maps.sigma), "median σ of a height"),
+            (median_text(maps.sigma()), "median σ of a height"),
             (format!("{:.2} px", pointing.residual_after_px), "residual of the tie points"),
             (format!("{seconds:.0} s"), "time"),
         ],
@@ -60,8 +60,8 @@ pub(crate) fn html(
         hatched: Some(maps.filled.clone()),
         ..JobPage::default()
     };
-    page.plots.extend(histogram("Heights", "height, m", &maps.heights, None));
-    page.plots.extend(histogram("Standard deviations", "σ, m", &maps.sigma, Some(SIGMA_END)));
+    page.plots.extend(histogram("Heights", "height, m", maps.heights(), None));
+    page.plots.extend(histogram("Standard deviations", "σ, m", maps.sigma(), Some(SIGMA_END)));
     page.plots.extend(residual_plot(report));
     page.plots.extend(residual_maps(report));
     page.plots.push(time_plot(report));

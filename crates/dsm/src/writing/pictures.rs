@@ -8,12 +8,12 @@ use std::path::Path;
 
 use io::raster::write_world_file;
 use raster::{Grid, Light, Window};
-use report::{Legend, LightEnd, MapLayer};
-use surfaces::surface_layer::FILLED;
-use sweep::fusion::CellSource;
+use reconstruct::DsmGrid;
+use report::MapLayer;
+use sweep::fusion::FILLED;
 
 use crate::error::DsmError;
-use crate::planning::grid::DsmGrid;
+use crate::writing::layers::{FILLED_FLAGS, HEIGHT_PERCENTILES, HEIGHTS, LAYERS, Layer, SIGMA};
 use job::files::FileError;
 
 /// Largest width and height of the pictures beside the rasters, of the layers of the page, and of
@@ -21,50 +21,17 @@ use job::files::FileError;
 const PICTURE_SIDE: usize = 4096;
 const LAYER_SIDE: usize = 1000;
 const THUMBNAIL_SIDE: usize = 256;
-/// Percentiles of the heights between which colours are spread, so that one mast does not take them
-/// from the rest.
-const HEIGHT_PERCENTILES: (f64, f64) = (1.0, 99.0);
-/// Percentile of σ at which its colours end.
-const SIGMA_PERCENTILE: f64 = 98.0;
 /// Distance and width of the stripes over filled cells, and their grey value.
 const HATCH: (usize, usize, u8) = (8, 1, 30);
 
-/// One of the rasters of a run.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Layer {
-    /// Heights above the vertical datum, metres.
-    Heights,
-    /// Standard deviations, metres.
-    Sigma,
-    /// Numbers of views.
-    Views,
-    /// Probabilities that the height is right.
-    Confidence,
-    /// 1 where a height was filled.
-    Filled,
-    /// Codes of [`CellSource`].
-    Source,
-}
-
-impl Layer {
-    const fn is_averaged(self) -> bool {
-        matches!(self, Self::Heights | Self::Sigma | Self::Confidence)
-    }
-}
-
-/// Reads a window of a raster of a run; NaN is no-data.
-pub(crate) type ReadLayer<'a> = &'a dyn Fn(Layer, Window) -> Result<Grid<f32>, DsmError>;
+/// Reads a window of a raster of a run, by its place in [`LAYERS`]; NaN is no-data.
+pub(crate) type ReadLayer<'a> = &'a dyn Fn(usize, Window) -> Result<Grid<f32>, DsmError>;
 
 /// The maps of a run, reduced for the page.
 #[derive(Debug, Clone)]
 pub(crate) struct RunMaps {
-    /// Heights, metres.
-    pub(crate) heights: Grid<f32>,
-    /// Standard deviations, metres.
-    pub(crate) sigma: Grid<f32>,
-    views: Grid<f32>,
-    confidence: Grid<f32>,
-    source: Grid<f32>,
+    /// In the order of [`LAYERS`].
+    maps: Vec<Grid<f32>>,
     /// Whether the cell was filled.
     pub(crate) filled: Grid<bool>,
     cell_m: f64,
@@ -77,63 +44,41 @@ impl RunMaps {
     /// Those of `read`.
     pub(crate) fn read(grid: &DsmGrid, read: ReadLayer<'_>) -> Result<Self, DsmError> {
         let factor = factor(grid.size, LAYER_SIDE);
-        let map = |layer: Layer| reduced(read, layer, grid.size, factor);
-        Ok(Self {
-            heights: map(Layer::Heights)?,
-            sigma: map(Layer::Sigma)?,
-            views: map(Layer::Views)?,
-            confidence: map(Layer::Confidence)?,
-            source: map(Layer::Source)?,
-            filled: map(Layer::Filled)?.map(|v| *v == f32::from(FILLED)),
-            cell_m: grid.gsd_m * factor as f64,
-        })
+        let maps: Vec<Grid<f32>> =
+            (0..LAYERS.len()).map(|layer| reduced(read, layer, grid.size, factor)).collect::<Result<_, _>>()?;
+        let filled = maps[FILLED_FLAGS].map(|v| *v == f32::from(FILLED));
+        Ok(Self { maps, filled, cell_m: grid.gsd_m * factor as f64 })
     }
 
-    /// Returns the legends of the rasters, with the name of their files.
-    fn legends(&self) -> [(&'static str, Legend); 6] {
-        let (low, high) =
-            raster::height_percentiles(&self.heights, HEIGHT_PERCENTILES.0, HEIGHT_PERCENTILES.1).unwrap_or((0.0, 1.0));
-        let sigma = raster::height_percentiles(&self.sigma, 0.0, SIGMA_PERCENTILE).map_or(1.0, |(_, high)| high);
-        let views = self.views.data().iter().copied().filter(|v| v.is_finite()).fold(2.0, f32::max);
-        [
-            ("dsm", Legend::heights(low, high, "m")),
-            ("sigma", Legend::sequential(0.0, f64::from(sigma), LightEnd::Low, "m")),
-            ("views", Legend::sequential(0.0, f64::from(views), LightEnd::High, "views")),
-            ("confidence", Legend::sequential(0.0, 1.0, LightEnd::High, "")),
-            ("filled", filled_legend()),
-            ("source", source_legend()),
-        ]
+    /// Returns the heights, metres.
+    pub(crate) fn heights(&self) -> &Grid<f32> {
+        &self.maps[HEIGHTS]
+    }
+
+    /// Returns the standard deviations, metres.
+    pub(crate) fn sigma(&self) -> &Grid<f32> {
+        &self.maps[SIGMA]
     }
 
     /// Returns the layers of the page.
     pub(crate) fn layers(&self) -> Vec<MapLayer> {
-        let [heights, sigma, views, confidence, _, source] = self.legends().map(|(_, legend)| legend);
-        let relief = relief(&self.heights, self.cell_m);
-        let layer = |name: &str, picture, legend, caption: &str| MapLayer {
-            name: name.to_owned(),
-            picture,
-            caption: caption.to_owned(),
-            legend: Some(legend),
+        let shown = |(place, (layer, map)): (usize, (&Layer, &Grid<f32>))| {
+            let (name, caption) = layer.on_page?;
+            let legend = (layer.legend)(map);
+            let picture = if place == HEIGHTS { relief(map, self.cell_m) } else { legend.picture(map) };
+            Some(MapLayer { name: name.to_owned(), picture, caption: caption.to_owned(), legend: Some(legend) })
         };
-        let (of_sigma, of_views) = (sigma.picture(&self.sigma), views.picture(&self.views));
-        let (of_confidence, of_source) = (confidence.picture(&self.confidence), source.picture(&self.source));
-        vec![
-            layer("Heights", relief, heights, "Heights above the vertical datum, shaded from the north-west."),
-            layer("σ", of_sigma, sigma, "Standard deviation of the height; an estimate where the cell was filled."),
-            layer("Source", of_source, source, "Where each height comes from, or why there is none."),
-            layer("Confidence", of_confidence, confidence, "Probability that the height is right to a few σ."),
-            layer("Views", of_views, views, "Number of views that observed the height; none where it was filled."),
-        ]
+        LAYERS.iter().zip(&self.maps).enumerate().filter_map(shown).collect()
     }
 
-    /// Writes a style of QGIS beside each raster, under the raster's name.
+    /// Writes the style for QGIS of each raster below the folder of a run.
     ///
     /// # Errors
     /// [`DsmError::File`].
     pub(crate) fn write_styles(&self, folder: &Path) -> Result<(), DsmError> {
-        for (name, legend) in self.legends() {
-            io::write_bytes(folder.join(format!("{name}.qml")), legend.qml().as_bytes(), false)
-                .map_err(FileError::from)?;
+        for (layer, map) in LAYERS.iter().zip(&self.maps) {
+            let style = (layer.legend)(map).qml();
+            io::write_bytes(folder.join(layer.style), style.as_bytes(), false).map_err(FileError::from)?;
         }
         Ok(())
     }
@@ -146,8 +91,8 @@ impl RunMaps {
 /// Those of `read`; [`DsmError::Image`] and [`DsmError::File`] when a file cannot be written.
 pub(crate) fn write_pictures(folder: &Path, grid: &DsmGrid, read: ReadLayer<'_>) -> Result<(), DsmError> {
     let side = factor(grid.size, PICTURE_SIDE);
-    let heights = reduced(read, Layer::Heights, grid.size, side)?;
-    let filled = reduced(read, Layer::Filled, grid.size, side)?;
+    let heights = reduced(read, HEIGHTS, grid.size, side)?;
+    let filled = reduced(read, FILLED_FLAGS, grid.size, side)?;
     let cell_m = grid.gsd_m * side as f64;
     let shade = raster::hillshade(&heights, (cell_m, cell_m), Light::default());
     io::raster::write_png_rgb(folder.join("hillshade.png"), &raster::shade_picture(&shade), false)?;
@@ -160,7 +105,7 @@ pub(crate) fn write_pictures(folder: &Path, grid: &DsmGrid, read: ReadLayer<'_>)
     }
     drop((heights, filled, picture));
     let side = factor(grid.size, THUMBNAIL_SIDE);
-    let small = relief(&reduced(read, Layer::Heights, grid.size, side)?, grid.gsd_m * side as f64);
+    let small = relief(&reduced(read, HEIGHTS, grid.size, side)?, grid.gsd_m * side as f64);
     io::raster::write_png_rgb(folder.join("thumbnail.png"), &small, false)?;
     let thumbnail = folder.join("thumbnail.png");
     write_world_file(&thumbnail, grid.geotransform, side).map_err(FileError::from)?;
@@ -193,14 +138,14 @@ fn factor(size: (usize, usize), most: usize) -> usize {
 }
 
 /// Reads a map and reduces it by `factor`.
-fn reduced(read: ReadLayer<'_>, layer: Layer, size: (usize, usize), factor: usize) -> Result<Grid<f32>, DsmError> {
+fn reduced(read: ReadLayer<'_>, layer: usize, size: (usize, usize), factor: usize) -> Result<Grid<f32>, DsmError> {
     let (width, height) = size;
     let mut out = Grid::filled(width.div_ceil(factor), height.div_ceil(factor), f32::NAN);
     for y in 0..out.height() {
         let top = y * factor;
         let strip = Window { x: 0, y: top as i64, width, height: factor.min(height - top) };
         let cells = read(layer, strip)?;
-        if !layer.is_averaged() {
+        if !LAYERS[layer].is_averaged() {
             let middle = cells.row(cells.height() / 2);
             let of = |x: usize| middle[(x * factor + factor / 2).min(width - 1)];
             out.row_mut(y).iter_mut().enumerate().for_each(|(x, cell)| *cell = of(x));
@@ -221,28 +166,6 @@ fn reduced(read: ReadLayer<'_>, layer: Layer, size: (usize, usize), factor: usiz
     Ok(out)
 }
 
-/// Returns the colours of the origins of heights: greens and blues for heights, browns and greys
-/// for voids.
-pub fn source_legend() -> Legend {
-    let code = |source: CellSource, colour: [u8; 3], text| (source.code(), colour, text);
-    Legend::Codes(vec![
-        code(CellSource::Observed, [86, 160, 96], "observed"),
-        code(CellSource::FilledHidden, [86, 140, 200], "filled: hidden ground"),
-        code(CellSource::FilledSurface, [240, 200, 80], "filled: surface that does not match"),
-        code(CellSource::FilledNarrow, [150, 205, 225], "filled: narrow gap"),
-        code(CellSource::FilledStreet, [170, 130, 200], "filled: street between roofs"),
-        code(CellSource::Unmatched, [200, 90, 60], "void: no match"),
-        code(CellSource::Blank, [120, 90, 70], "void: one grey value"),
-        code(CellSource::Hidden, [70, 70, 110], "void: hidden"),
-        code(CellSource::Masked, [40, 40, 40], "void: masked"),
-    ])
-}
-
-/// Returns the colours of observed and filled cells.
-pub fn filled_legend() -> Legend {
-    Legend::Codes(vec![(0, [86, 160, 96], "observed"), (FILLED, [240, 200, 80], "filled")])
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -251,19 +174,11 @@ mod tests {
     fn codes_are_not_averaged_and_heights_are() {
         let cells: Vec<f32> = vec![1.0, 1.0, 10.0, f32::NAN, 3.0, 1.0, 10.0, 4.0];
         let whole = Grid::from_vec(4, 2, cells).unwrap();
-        let read = |_: Layer, window: Window| Ok(whole.window(window, f32::NAN));
-        let heights = reduced(&read, Layer::Heights, (4, 2), 2).unwrap();
+        let read = |_: usize, window: Window| Ok(whole.window(window, f32::NAN));
+        let heights = reduced(&read, HEIGHTS, (4, 2), 2).unwrap();
         assert_eq!(heights.data(), [1.5, 8.0]);
-        let codes = reduced(&read, Layer::Source, (4, 2), 2).unwrap();
+        let source = LAYERS.iter().position(|layer| layer.stem == "source").unwrap();
+        let codes = reduced(&read, source, (4, 2), 2).unwrap();
         assert_eq!(codes.data(), [1.0, 4.0]);
-    }
-
-    #[test]
-    fn every_source_has_a_colour() {
-        let Legend::Codes(codes) = source_legend() else { unreachable!("the sources are codes") };
-        let mut colours: Vec<[u8; 3]> = codes.iter().map(|(_, colour, _)| *colour).collect();
-        colours.sort_unstable();
-        colours.dedup();
-        assert_eq!(colours.len(), 9);
     }
 }

@@ -26,8 +26,8 @@ City models, splats, cameras
     :func:`mesh`; :func:`align` and :func:`split` of COLMAP models; :func:`rpc_info`, :func:`rpc_convert`.
 Objects on arrays
     :class:`Rpc` projects points and finds them (:class:`FittedRpc` is a fit), :class:`HeightSweep`
-    finds the heights of arrays (:class:`ViewHeights`), :class:`CityModel` casts rays
-    (:class:`Hits`), and :class:`Raster` has cells with their map and vertical datum (:class:`Bounds`,
+    finds the heights of arrays (:class:`ViewHeights`) and their surface (:class:`ViewSurface`),
+    :class:`CityModel` casts rays (:class:`Hits`), and :class:`Raster` has cells with their map and vertical datum (:class:`Bounds`,
     :func:`read_raster`, :func:`write_raster`).
 Progress, reports, errors
     `progress` takes ``True`` or a function of a :class:`Step` (:data:`Progress`). A :class:`Report`
@@ -68,6 +68,7 @@ from ._rpc import FittedRpc as FittedRpc
 from ._rpc import Rpc as Rpc
 from ._sweep import HeightSweep as HeightSweep
 from ._sweep import ViewHeights as ViewHeights
+from ._sweep import ViewSurface as ViewSurface
 
 __all__ = [
     "Bounds",
@@ -91,6 +92,7 @@ __all__ = [
     "SkysweepError",
     "Step",
     "ViewHeights",
+    "ViewSurface",
     "__version__",
     "allow_remote",
     "evaluate",

@@ -14,6 +14,16 @@ def fetch_grids() -> None: ...
 def sweep_views(
     views: list[tuple[_F32, RpcCore]], height_range: tuple[float, float], preset: str, watcher: object
 ) -> list[tuple[int, list[int], _F64, _F32, _F32, NDArray[np.uint8]]]: ...
+def surface_of_views(
+    views: list[tuple[_F32, RpcCore]],
+    height_range: tuple[float, float],
+    preset: str,
+    bounds: tuple[float, float, float, float],
+    epsg: int,
+    cell_m: float,
+    fill: str,
+    watcher: object,
+) -> tuple[tuple[float, ...], _F32, _F32, _F32, NDArray[np.uint8], NDArray[np.uint8]]: ...
 def write_grid(
     path: str,
     heights: _F32,

@@ -12,9 +12,10 @@ from . import _native
 from ._arrays import floats, refuse_marks
 from ._call import Progress, watcher
 from ._errors import InputError
+from ._raster import Raster
 from ._rpc import Rpc
 
-__all__ = ["HeightSweep", "ViewHeights"]
+__all__ = ["HeightSweep", "ViewHeights", "ViewSurface"]
 
 
 class ViewHeights(NamedTuple):
@@ -33,6 +34,21 @@ class ViewHeights(NamedTuple):
     level: int
     #: Positions of the views that it was compared with, the best first.
     sources: list[int]
+
+
+class ViewSurface(NamedTuple):
+    """The surface of views on a map. All arrays have the cells of `heights`: (rows, columns)."""
+
+    #: Metres above the ellipsoid, with their place on the map; NaN where there is none.
+    heights: Raster
+    #: Standard deviations, metres, f32; NaN where there is no height.
+    sigma_m: NDArray[np.float32]
+    #: Probability that the height is right, 0 to 1, f32; 0 where there is no height.
+    probability: NDArray[np.float32]
+    #: Number of views that observed the height, u8; 0 where it was filled.
+    views: NDArray[np.uint8]
+    #: Where the height comes from, or why there is none, u8: the codes of ``dsm/source.tif``.
+    source: NDArray[np.uint8]
 
 
 class HeightSweep:
@@ -95,6 +111,38 @@ class HeightSweep:
             ViewHeights(height_m, sigma_m, confidence, agreeing, level, sources)
             for level, sources, height_m, sigma_m, confidence, agreeing in found
         ]
+
+    def surface(
+        self,
+        bounds: tuple[float, float, float, float],
+        gsd_m: float,
+        crs_epsg: int,
+        *,
+        fill: Literal["none", "justified", "all"] = "justified",
+        progress: Progress = None,
+    ) -> ViewSurface:
+        """Computes the surface of the views on a map: a DSM without files.
+
+        It is that of a run whose pointing is not corrected and whose heights to search are given.
+
+        Args:
+            bounds: Left, bottom, right and top of the surface on the map. The grid is snapped to whole cells.
+            gsd_m: Side of a cell on the ground, metres.
+            crs_epsg: EPSG code of the map, such as that of the scene's UTM zone.
+            fill: Voids that are closed: ``none``, ``justified`` or ``all``.
+
+        Raises:
+            InputError: There are fewer than two views, or the bounds hold no cells.
+            CrsError: PROJ does not know the map.
+            SkysweepError: The views share no ground, or look along the same line.
+        """
+        left, bottom, right, top = (float(edge) for edge in bounds)
+        with watcher(progress) as watching:
+            geotransform, heights, sigma_m, probability, views, source = _native.surface_of_views(
+                self._views, self._range, self._preset, (left, bottom, right, top), crs_epsg, gsd_m, fill, watching
+            )
+        raster = Raster(heights, geotransform, crs_epsg, vertical="ellipsoid")
+        return ViewSurface(raster, sigma_m, probability, views, source)
 
 
 def _is_f32(pixels: Any) -> bool:

@@ -10,8 +10,9 @@ use raster::Grid;
 use super::error::ClassesError;
 use crate::eval::EvalJobError;
 use crate::eval::on_reference::surface_on_reference;
-use crate::surface_layer::{FILLED_FLAGS, OBSERVED, SIGMA, layer_beside};
+use crate::surface_layer::{FILLED_FLAGS, SIGMA, layer_beside};
 use job::files::FileError;
+use sweep::fusion::OBSERVED;
 
 /// A building index at the cells of a surface.
 pub(super) struct Cue {

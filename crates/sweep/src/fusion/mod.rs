@@ -15,14 +15,16 @@ mod fill;
 mod mesh;
 mod plane;
 mod regularise;
+mod source;
 mod speckle;
 mod trend;
 mod trust;
 
 pub use cells::{BLOCK, FusedSurface, FusionConfig, fuse_views};
 pub use envelope::{GridSight, occlusion_bounds};
-pub use fill::{CellSource, FillConfig, FillRule, FilledVoids, KnownVoids, fill_voids};
+pub use fill::{FillConfig, FillRule, FilledVoids, KnownVoids, fill_voids};
 pub use mesh::{GridFrame, PlacedView, mark_cells, place_view};
+pub use source::{CellSource, FILLED, OBSERVED, VOID};
 pub use speckle::remove_speckle;
 pub use trend::{TrendConfig, ground_trend};
 pub use trust::{Trust, TrustConfig, calibrate, surroundings};

@@ -7,20 +7,21 @@
 use numeric::Progress;
 use raster::{Grid, Window};
 use serde::{Deserialize, Serialize};
-use surfaces::surface_layer::{FILLED, OBSERVED, VOID};
 use sweep::consistency::{ConsistencyConfig, Heights, count_agreeing};
-use sweep::fusion::{CellSource, FusionConfig, GridFrame, PlacedView, fuse_views, mark_cells, place_view};
+use sweep::fusion::{
+    CellSource, FILLED, FusionConfig, GridFrame, OBSERVED, PlacedView, VOID, fuse_views, mark_cells, place_view,
+};
 use sweep::{HeightMap, SweepView};
 
-use crate::chunks::rasters::ChunkRasters;
-use crate::config::DsmConfig;
-use crate::error::DsmError;
-use crate::planning::grid::DsmGrid;
-use crate::sweeping::clean_up::{Lengths, Voids, clean_up};
-use crate::sweeping::grid_sight::{ViewPixels, grid_sights};
-use crate::sweeping::ground_mask::GroundMask;
-use crate::sweeping::scene_sweep::{LatticeHeights, SceneHeights, SceneSweep};
-use crate::sweeping::shadow_side::ShadowCounts;
+use crate::error::ReconstructError;
+use crate::grid::DsmGrid;
+use crate::scene_sweep::{LatticeHeights, SceneHeights, SceneSweep};
+use crate::surface::clean_up::{Lengths, Voids, clean_up};
+use crate::surface::fill::Fill;
+use crate::surface::grid_sight::{ViewPixels, grid_sights};
+use crate::surface::ground_mask::GroundMask;
+use crate::surface::rasters::SurfaceRasters;
+use crate::surface::shadow_side::ShadowCounts;
 use crate::values::{HeightRange, ImagePair};
 
 /// A facet steeper than this (rise over run) is a tear and not a surface: about 70°. Two hypotheses
@@ -32,29 +33,42 @@ const WITNESSES_MAX: usize = 12;
 /// Reach of the patch that the cost of a pixel sees, pixels.
 const PATCH_REACH: usize = 2;
 
+/// What is asked of a surface.
+#[derive(Debug, Clone, Copy)]
+pub struct SurfaceOptions {
+    /// Voids that are closed.
+    pub fill: Fill,
+    /// Heights that were asked for: others are dropped. All when `None`.
+    pub height_range: Option<HeightRange>,
+    /// Side of the tiles that are fused at a time, cells. It changes the memory needed, never the
+    /// result.
+    pub tile: usize,
+}
+
 /// Everything but pixels and heights that a surface is made from.
 #[derive(Clone, Copy)]
-pub(crate) struct SurfaceInput<'a> {
-    pub(crate) config: &'a DsmConfig,
-    pub(crate) sweep: &'a SceneSweep,
+pub struct SurfaceInput<'a> {
+    /// What is asked of the surface.
+    pub options: SurfaceOptions,
+    /// The sweep that found the heights.
+    pub sweep: &'a SceneSweep,
     /// Pairs of views that look from different directions.
-    pub(crate) useful: &'a [ImagePair],
+    pub useful: &'a [ImagePair],
     /// Grid of the core with its rim.
-    pub(crate) grid: &'a DsmGrid,
+    pub grid: &'a DsmGrid,
     /// Side of a pixel of the coarsest image on the ground, metres.
-    pub(crate) pixel_m: f64,
+    pub pixel_m: f64,
     /// Deviation of heights that the cameras leave, metres.
-    pub(crate) camera_m: f64,
+    pub camera_m: f64,
     /// Cells of the grid that are kept.
-    pub(crate) core: Window,
+    pub core: Window,
     /// Cells of the grid that get no height.
-    pub(crate) mask: Option<&'a GroundMask>,
+    pub mask: Option<&'a GroundMask>,
 }
 
 /// Counts of cells and pixels.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[non_exhaustive]
 pub struct SurfaceCounts {
     /// Cells with an observed height.
     pub observed: usize,
@@ -77,7 +91,6 @@ pub struct SurfaceCounts {
 /// Counts of the pixels of a view.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[non_exhaustive]
 pub struct KeptPixels {
     /// Pixels with which enough other views agree.
     pub kept: u64,
@@ -90,7 +103,7 @@ pub struct KeptPixels {
 
 impl SurfaceCounts {
     /// Counts the cells of rasters.
-    pub(crate) fn of(rasters: &ChunkRasters) -> Self {
+    pub fn of(rasters: &SurfaceRasters) -> Self {
         let count = |grid: &Grid<u8>, value: u8| grid.data().iter().filter(|v| **v == value).count();
         Self {
             observed: count(&rasters.filled, OBSERVED),
@@ -104,7 +117,7 @@ impl SurfaceCounts {
     }
 
     /// Adds the counts of another part of the same scene.
-    pub(crate) fn add(&mut self, other: &Self) {
+    pub fn add(&mut self, other: &Self) {
         self.observed += other.observed;
         self.filled += other.filled;
         self.void += other.void;
@@ -124,15 +137,15 @@ impl SurfaceCounts {
 /// a step of `progress`.
 ///
 /// # Errors
-/// [`DsmError::Sweep`] for a camera that fails inside the scene, [`DsmError::Crs`],
-/// [`DsmError::Cancelled`].
-pub(crate) fn make_surface(
+/// [`ReconstructError::Sweep`] for a camera that fails inside the scene, [`ReconstructError::Crs`],
+/// [`ReconstructError::Cancelled`].
+pub fn make_surface(
     input: SurfaceInput<'_>,
     mut views: Vec<SweepView>,
     heights: SceneHeights,
     progress: &dyn Progress,
-) -> Result<(ChunkRasters, SurfaceCounts), DsmError> {
-    let SurfaceInput { config, sweep, useful, grid, .. } = input;
+) -> Result<(SurfaceRasters, SurfaceCounts), ReconstructError> {
+    let SurfaceInput { options, sweep, useful, grid, .. } = input;
     let finest = sweep.levels.finest;
     let projection = grid.projection()?;
     let map_from_ground = |g: geodesy::LonLatHeight| projection.map_from_lonlat(g.lon_deg, g.lat_deg).ok();
@@ -159,11 +172,11 @@ pub(crate) fn make_surface(
                 let blank = own.view.blank(finest);
                 let mut keep = agreeing(own, &witnesses(own, &all, useful, &sweep.sources), level)?;
                 drop_at_rim(&mut keep, own.map, sweep.range, step_m);
-                if let Some(asked) = config.height_range_m {
+                if let Some(asked) = options.height_range {
                     drop_outside(&mut keep, own.map, asked);
                 }
                 if number == 0 {
-                    mark_cells(own, level, &shows_nothing(own.map, &blank, config), &frame, &mut blind)?;
+                    mark_cells(own, level, &shows_nothing(own.map, &blank, options.height_range), &frame, &mut blind)?;
                     let data = keep.data();
                     kept[index] = KeptPixels {
                         kept: data.iter().filter(|k| **k).count() as u64,
@@ -197,8 +210,8 @@ fn fuse(
     blind: &Grid<bool>,
     pixels: &[ViewPixels],
     origin_m: f64,
-) -> Result<(ChunkRasters, SurfaceCounts), DsmError> {
-    let SurfaceInput { config, sweep, grid, core, mask, .. } = input;
+) -> Result<(SurfaceRasters, SurfaceCounts), ReconstructError> {
+    let SurfaceInput { options, sweep, grid, core, mask, .. } = input;
     // Heights and their places are as coarse as the level that they come from.
     let coarser = f64::from(1u32 << sweep.levels.finest);
     let step_m = sweep.step_at(sweep.levels.finest);
@@ -207,7 +220,7 @@ fn fuse(
         tear_m: (TEAR_SLOPE * input.pixel_m * coarser).max(2.0 * step_m) as f32,
         step_m,
         origin_m,
-        tile: config.tile,
+        tile: options.tile,
     };
     let mut fused = fuse_views(&placed, grid.size, &fusion);
     drop(placed);
@@ -218,7 +231,7 @@ fn fuse(
     }
     let sights = grid_sights(pixels, grid, &fused.height_m, origin_m)?;
     let lengths = Lengths { gsd_m: grid.gsd_m, step_m, camera_m: input.camera_m };
-    let voids = Voids { blind, sights: &sights, fill: config.fill };
+    let voids = Voids { blind, sights: &sights, fill: options.fill };
     let (mut source, speckle_removed) = clean_up(&mut fused, voids, lengths, core);
     if let Some(mask) = mask {
         for cell in (0..source.data().len()).filter(|cell| mask.excludes(*cell)) {
@@ -227,16 +240,16 @@ fn fuse(
             source.data_mut()[cell] = CellSource::Masked;
         }
     }
-    let rasters = ChunkRasters::new(fused, &source, origin_m).cropped(core);
+    let rasters = SurfaceRasters::new(fused, &source, origin_m).cropped(core);
     let counts = SurfaceCounts { speckle_removed, ..SurfaceCounts::of(&rasters) };
     Ok((rasters, counts))
 }
 
 /// Marks the pixels that show no height: blank ones, and those whose best height lies outside the
 /// range that was asked for.
-fn shows_nothing(map: &HeightMap, blank: &Grid<bool>, config: &DsmConfig) -> Grid<bool> {
+fn shows_nothing(map: &HeightMap, blank: &Grid<bool>, asked: Option<HeightRange>) -> Grid<bool> {
     let mut out = blank.clone();
-    if let Some(asked) = config.height_range_m {
+    if let Some(asked) = asked {
         out.data_mut().iter_mut().zip(map.height_m.data()).for_each(|(m, h)| *m |= is_outside(map, *h, asked));
     }
     out
@@ -281,7 +294,7 @@ fn witnesses<'a>(
 /// from another direction, and at least one. With a third, a chance agreement of two views among
 /// many does not put a height on the map. A single reference view has no other view to agree with,
 /// and keeps all its heights.
-fn agreeing(own: Heights<'_>, others: &[Heights<'_>], level: u32) -> Result<Grid<bool>, DsmError> {
+fn agreeing(own: Heights<'_>, others: &[Heights<'_>], level: u32) -> Result<Grid<bool>, ReconstructError> {
     if others.is_empty() {
         return Ok(own.map.height_m.map(|h| !h.is_nan()));
     }

@@ -13,9 +13,9 @@ use numeric::Progress;
 use sweep::consistency::{ConsistencyConfig, Heights, count_agreeing};
 use sweep::{HeightMap, SweepView, source_from_reference};
 
-use crate::error::DsmError;
+use crate::error::ReconstructError;
 use crate::planning::levels::SweepLevels;
-use crate::sweeping::scene_sweep::{SceneHeights, SceneSweep, sweep_scene};
+use crate::scene_sweep::{SceneHeights, SceneSweep, sweep_scene};
 use crate::values::HeightRange;
 
 /// Searched below the heights of the tie points, metres: the deepest quarries beside ground with
@@ -41,10 +41,11 @@ const MARGIN_M: f64 = 20.0;
 
 /// A height range found by a sweep.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct FoundRange {
-    pub(crate) range: HeightRange,
+pub struct FoundRange {
+    /// Heights, metres above the ellipsoid.
+    pub range: HeightRange,
     /// Number of pixels with these heights.
-    pub(crate) pixels: usize,
+    pub pixels: usize,
 }
 
 /// A height at a pixel of a view.
@@ -61,14 +62,14 @@ struct ViewHeight {
 /// The levels of `sweep` are not used.
 ///
 /// # Errors
-/// [`DsmError::Sweep`] from the consistency check, [`DsmError::Cancelled`].
-pub(crate) fn extended_range(
+/// [`ReconstructError::Sweep`] from the consistency check, [`ReconstructError::Cancelled`].
+pub fn extended_range(
     views: &[SweepView],
     sweep: &SceneSweep,
     gsd_m: f64,
     sides: &[usize],
     progress: &dyn Progress,
-) -> Result<Option<FoundRange>, DsmError> {
+) -> Result<Option<FoundRange>, ReconstructError> {
     let range = sweep.range;
     let levels = SweepLevels::only(level_of(gsd_m, sides));
     let coarse = SceneSweep { range: widened(range), levels, ..sweep.clone() };
@@ -78,13 +79,13 @@ pub(crate) fn extended_range(
 }
 
 /// Returns a range that holds towers and pits beside what lies in `range`.
-pub(crate) fn widened(range: HeightRange) -> HeightRange {
+pub fn widened(range: HeightRange) -> HeightRange {
     range.grown(BELOW_M, ABOVE_M)
 }
 
 /// Returns the level that is swept. `gsd_m` is a pixel at full resolution, and `sides` are the
 /// shortest sides of the levels.
-pub(crate) fn level_of(gsd_m: f64, sides: &[usize]) -> usize {
+pub fn level_of(gsd_m: f64, sides: &[usize]) -> usize {
     let fits = |(l, side): &(usize, &usize)| **side >= SIDE_MIN && gsd_m * f64::from(1u32 << l) <= PIXEL_M;
     sides.iter().enumerate().take_while(fits).count().saturating_sub(1)
 }
@@ -93,13 +94,13 @@ pub(crate) fn level_of(gsd_m: f64, sides: &[usize]) -> usize {
 /// nothing is sure. Most heights are within `usual`.
 ///
 /// # Errors
-/// [`DsmError::Sweep`] from the consistency check, [`DsmError::Cancelled`].
-pub(crate) fn seen_range(
+/// [`ReconstructError::Sweep`] from the consistency check, [`ReconstructError::Cancelled`].
+pub fn seen_range(
     views: &[SweepView],
     sweep: &SceneSweep,
     usual: HeightRange,
     progress: &dyn Progress,
-) -> Result<Option<FoundRange>, DsmError> {
+) -> Result<Option<FoundRange>, ReconstructError> {
     let found = sure_heights(views, sweep, usual, |_| true, progress)?;
     Ok((!found.is_empty()).then(|| FoundRange { range: extremes(&found), pixels: found.len() }))
 }
@@ -119,11 +120,11 @@ fn sure_heights(
     usual: HeightRange,
     is_asked: impl Fn(f64) -> bool,
     progress: &dyn Progress,
-) -> Result<Vec<f64>, DsmError> {
+) -> Result<Vec<f64>, ReconstructError> {
     let level = sweep.levels.finest;
     let maps = match sweep_scene(views, sweep, progress) {
         Ok(SceneHeights { maps, .. }) => maps,
-        Err(DsmError::Cancelled) => return Err(DsmError::Cancelled),
+        Err(ReconstructError::Cancelled) => return Err(ReconstructError::Cancelled),
         // A camera that fails far from the scene is no evidence about what stands there.
         Err(_) => return Ok(Vec::new()),
     };

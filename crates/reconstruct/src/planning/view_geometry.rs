@@ -10,18 +10,26 @@ use rstar::{RTree, RTreeObject};
 use serde::{Deserialize, Serialize};
 use sweep::source_from_reference;
 
-use crate::error::DsmError;
-use crate::images::footprints::{footprint, local_polygon, overlap_share};
-use crate::images::scene_image::SceneImage;
+use crate::error::ReconstructError;
+use crate::planning::footprints::{footprint, local_polygon, overlap_share};
 use crate::values::ImagePair;
 
 /// Least angle between two lines of sight that gives heights, degrees. Matching is off by a fifth
 /// of a pixel, which at this angle is a height of more than 20 pixels' ground.
-pub(crate) const ANGLE_MIN_DEG: f64 = 0.5;
+pub const ANGLE_MIN_DEG: f64 = 0.5;
 /// Beyond this angle walls and roofs look too different to be matched, degrees.
-pub(crate) const ANGLE_MAX_DEG: f64 = 50.0;
+pub const ANGLE_MAX_DEG: f64 = 50.0;
 /// Least share of ground that two images have in common to be matched.
-pub(crate) const OVERLAP_MIN: f64 = 0.05;
+pub const OVERLAP_MIN: f64 = 0.05;
+
+/// What the geometry of an image follows from.
+#[derive(Debug, Clone, Copy)]
+pub struct ImageGeometry<'a> {
+    /// Camera in the frame of the whole image.
+    pub camera: &'a RpcCamera,
+    /// Width and height, pixels.
+    pub size: (usize, usize),
+}
 
 /// Geometry of a pair of views.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -35,13 +43,13 @@ pub struct PairGeometry {
 }
 
 /// Geometry of all views and pairs of views at one height.
-pub(crate) struct ViewGeometry {
+pub struct ViewGeometry {
     /// Middle of the ground that the first overlapping pair shares, which surely lies in the scene.
-    pub(crate) centre: LonLatHeight,
+    pub centre: LonLatHeight,
     /// Local frame, with its origin at the first corner of the first image.
-    pub(crate) frame: EnuFrame,
+    pub frame: EnuFrame,
     /// Footprints of the images in that frame.
-    pub(crate) outlines: Vec<Polygon<f64>>,
+    pub outlines: Vec<Polygon<f64>>,
     /// Geometry by pair; `None` for a pair that shares no ground.
     pairs: Grid<Option<PairGeometry>>,
 }
@@ -50,14 +58,14 @@ impl ViewGeometry {
     /// Computes the geometry at `height_m`, metres above the ellipsoid.
     ///
     /// # Errors
-    /// [`DsmError::Camera`] for an image without a footprint, [`DsmError::NoOverlap`] when no two
+    /// [`ReconstructError::Camera`] for an image without a footprint, [`ReconstructError::NoOverlap`] when no two
     /// images share ground.
-    pub(crate) fn at(images: &[SceneImage], height_m: f64) -> Result<Self, DsmError> {
-        let failed = |i: usize| move |source: CameraError| DsmError::Camera { path: images[i].path.clone(), source };
+    pub fn at(images: &[ImageGeometry<'_>], height_m: f64) -> Result<Self, ReconstructError> {
+        let failed = |view: usize| move |source: CameraError| ReconstructError::Camera { view, source };
         let prints: Vec<Vec<LonLatHeight>> = images
             .iter()
             .enumerate()
-            .map(|(i, image)| footprint(&image.camera, image.size, height_m).map_err(failed(i)))
+            .map(|(i, image)| footprint(image.camera, image.size, height_m).map_err(failed(i)))
             .collect::<Result<_, _>>()?;
         let frame = EnuFrame::new(prints[0][0]);
         let outlines: Vec<Polygon<f64>> = prints.iter().map(|p| local_polygon(p, &frame)).collect();
@@ -72,25 +80,25 @@ impl ViewGeometry {
                 let ground = LonLatHeight { height_m, ..frame.ground_from_enu(middle) };
                 centre.get_or_insert(ground);
                 // A camera that fails at this point belongs to a pair that cannot be matched.
-                if let Ok(pair) = pair_geometry(&images[i].camera, &images[j].camera, ground, share) {
+                if let Ok(pair) = pair_geometry(images[i].camera, images[j].camera, ground, share) {
                     pairs[(i, j)] = Some(pair);
                     pairs[(j, i)] = Some(pair);
                 }
             }
         }
-        let Some(centre) = centre else { return Err(DsmError::NoOverlap { share_percent: 0.0 }) };
+        let Some(centre) = centre else { return Err(ReconstructError::NoOverlap { share_percent: 0.0 }) };
         Ok(Self { centre, frame, outlines, pairs })
     }
 
     /// Returns the geometry of a pair; `None` when the two share no ground.
-    pub(crate) fn pair(&self, pair: ImagePair) -> Option<&PairGeometry> {
+    pub fn pair(&self, pair: ImagePair) -> Option<&PairGeometry> {
         self.pairs.get(pair.first, pair.second).and_then(Option::as_ref)
     }
 
     /// Returns the centre of the scene if an image shows it, and else the middle of the image.
     ///
     /// A camera far outside its image has no meaning, and in a block the centre may be far away.
-    pub(crate) fn middle_of(&self, image: usize) -> LonLatHeight {
+    pub fn middle_of(&self, image: usize) -> LonLatHeight {
         let centre = self.frame.enu_from_ground(self.centre);
         let outline = &self.outlines[image];
         match outline.centroid() {
@@ -103,15 +111,15 @@ impl ViewGeometry {
     }
 
     /// Returns the side of a pixel on the ground, metres; `None` where the camera has no ground.
-    pub(crate) fn ground_sampling_m(&self, image: &SceneImage, index: usize) -> Option<f64> {
-        image.camera.gsd(self.middle_of(index)).ok().map(|g| g.mean_m())
+    pub fn ground_sampling_m(&self, camera: &RpcCamera, image: usize) -> Option<f64> {
+        camera.gsd(self.middle_of(image)).ok().map(|g| g.mean_m())
     }
 
     /// Returns the pairs that can give heights, the best angles first.
     ///
     /// # Errors
-    /// [`DsmError::NoOverlap`] and [`DsmError::NoParallax`] when there is none.
-    pub(crate) fn useful_pairs(&self) -> Result<Vec<ImagePair>, DsmError> {
+    /// [`ReconstructError::NoOverlap`] and [`ReconstructError::NoParallax`] when there is none.
+    pub fn useful_pairs(&self) -> Result<Vec<ImagePair>, ReconstructError> {
         let n = self.outlines.len();
         let all: Vec<(ImagePair, PairGeometry)> = (0..n)
             .flat_map(|i| (i + 1..n).map(move |j| ImagePair::new(i, j)))
@@ -120,7 +128,7 @@ impl ViewGeometry {
         let largest = |f: fn(&PairGeometry) -> f64| all.iter().map(|(_, g)| f(g)).fold(0.0, f64::max);
         let overlap = largest(|g| g.overlap);
         if overlap < OVERLAP_MIN {
-            return Err(DsmError::NoOverlap { share_percent: 100.0 * overlap });
+            return Err(ReconstructError::NoOverlap { share_percent: 100.0 * overlap });
         }
         let mut useful: Vec<_> = all
             .iter()
@@ -128,7 +136,7 @@ impl ViewGeometry {
             .collect();
         if useful.is_empty() {
             let angle_deg = largest(|g| g.angle_deg);
-            return Err(DsmError::NoParallax { angle_deg, needed_deg: ANGLE_MIN_DEG });
+            return Err(ReconstructError::NoParallax { angle_deg, needed_deg: ANGLE_MIN_DEG });
         }
         useful.sort_by(|a, b| angle_merit(b.1.angle_deg).total_cmp(&angle_merit(a.1.angle_deg)));
         Ok(useful.into_iter().map(|(pair, _)| *pair).collect())
@@ -137,7 +145,7 @@ impl ViewGeometry {
 
 /// Rates an intersection angle from 0 to 1. Small angles give imprecise heights, and large ones
 /// give pictures that differ too much. The best published pairs lie between 5° and 25°.
-pub(crate) fn angle_merit(angle_deg: f64) -> f64 {
+pub fn angle_merit(angle_deg: f64) -> f64 {
     (-((angle_deg - 15.0) / 15.0).powi(2)).exp()
 }
 
@@ -164,7 +172,7 @@ fn middle_of_both(a: &Polygon<f64>, b: &Polygon<f64>) -> Option<EnuPoint> {
 }
 
 /// Computes the geometry of a pair of cameras at a ground point.
-pub(crate) fn pair_geometry(
+pub fn pair_geometry(
     a: &RpcCamera,
     b: &RpcCamera,
     centre: LonLatHeight,

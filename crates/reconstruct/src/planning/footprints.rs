@@ -8,7 +8,7 @@ use geodesy::{EnuFrame, LonLatHeight};
 ///
 /// # Errors
 /// A failure of the camera to localise an outline point.
-pub(crate) fn footprint(
+pub fn footprint(
     camera: &RpcCamera,
     (width, height): (usize, usize),
     height_m: f64,
@@ -20,7 +20,7 @@ pub(crate) fn footprint(
 }
 
 /// Returns the convex hull of a footprint, in metres of a local frame.
-pub(crate) fn local_polygon(footprint: &[LonLatHeight], frame: &EnuFrame) -> Polygon<f64> {
+pub fn local_polygon(footprint: &[LonLatHeight], frame: &EnuFrame) -> Polygon<f64> {
     let points: MultiPoint<f64> = footprint
         .iter()
         .map(|p| {
@@ -32,21 +32,21 @@ pub(crate) fn local_polygon(footprint: &[LonLatHeight], frame: &EnuFrame) -> Pol
 }
 
 /// Returns the ground that two convex outlines share; `None` where they do not meet.
-pub(crate) fn shared_part(a: &Polygon<f64>, b: &Polygon<f64>) -> Option<Polygon<f64>> {
+pub fn shared_part(a: &Polygon<f64>, b: &Polygon<f64>) -> Option<Polygon<f64>> {
     let meets = a.bounding_rect()?.intersects(&b.bounding_rect()?);
     let parts = if meets { a.intersection(b).0 } else { Vec::new() };
     parts.into_iter().max_by(|p, q| p.unsigned_area().total_cmp(&q.unsigned_area())).filter(|p| p.unsigned_area() > 0.0)
 }
 
 /// Returns the common area of two outlines as a share of the smaller one.
-pub(crate) fn overlap_share(a: &Polygon<f64>, b: &Polygon<f64>) -> f64 {
+pub fn overlap_share(a: &Polygon<f64>, b: &Polygon<f64>) -> f64 {
     let smaller = a.unsigned_area().min(b.unsigned_area());
     if smaller > 0.0 { a.intersection(b).unsigned_area() / smaller } else { 0.0 }
 }
 
 /// Returns the convex hull of the ground that at least two of the outlines share; `None` where no
 /// two meet.
-pub(crate) fn shared_ground(outlines: &[Polygon<f64>]) -> Option<Polygon<f64>> {
+pub fn shared_ground(outlines: &[Polygon<f64>]) -> Option<Polygon<f64>> {
     let mut points: Vec<Point<f64>> = Vec::new();
     for (i, a) in outlines.iter().enumerate() {
         for b in &outlines[..i] {

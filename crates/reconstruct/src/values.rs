@@ -19,6 +19,10 @@ pub struct HeightRange {
 }
 
 impl HeightRange {
+    /// Heights of the Earth's surface above the ellipsoid: the shore of the Dead Sea and Everest,
+    /// rounded outward.
+    pub const EARTH: Self = Self::new(-500.0, 9000.0);
+
     /// Makes a range from its ends.
     pub const fn new(low_m: f64, high_m: f64) -> Self {
         Self { low_m, high_m }
@@ -37,6 +41,11 @@ impl HeightRange {
     /// Returns the middle of the range.
     pub fn middle_m(self) -> f64 {
         0.5 * (self.low_m + self.high_m)
+    }
+
+    /// Returns whether the range is one of the Earth's surface, the lower end first.
+    pub fn is_on_earth(self) -> bool {
+        Self::EARTH.low_m <= self.low_m && self.low_m < self.high_m && self.high_m <= Self::EARTH.high_m
     }
 
     /// Returns whether a height lies in the range, ends included.
@@ -113,7 +122,7 @@ impl TryFrom<[usize; 2]> for ImagePair {
         if first == second {
             return Err(format!("a pair needs two different images, found [{first}, {second}]"));
         }
-        Ok(Self { first: from_one(first)?, second: from_one(second)? })
+        Ok(Self { first: index_of_position(first)?, second: index_of_position(second)? })
     }
 }
 
@@ -124,25 +133,11 @@ impl From<ImagePair> for [usize; 2] {
 }
 
 /// Returns the position counted from 0 of one that people count from 1.
-fn from_one(position: usize) -> Result<usize, String> {
+///
+/// # Errors
+/// A sentence for the position 0.
+pub fn index_of_position(position: usize) -> Result<usize, String> {
     position.checked_sub(1).ok_or_else(|| "positions of images count from 1, found 0".to_owned())
-}
-
-/// Serde adapter for positions of images, which are written as people count them, from 1.
-pub(crate) mod positions_from_one {
-    use serde::de::Error;
-    use serde::{Deserialize, Deserializer, Serialize, Serializer};
-
-    pub(crate) fn serialize<S: Serializer>(positions: &Option<Vec<usize>>, out: S) -> Result<S::Ok, S::Error> {
-        let written = positions.as_ref().map(|all| all.iter().map(|position| position + 1).collect::<Vec<usize>>());
-        written.serialize(out)
-    }
-
-    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(input: D) -> Result<Option<Vec<usize>>, D::Error> {
-        let read = Option::<Vec<usize>>::deserialize(input)?;
-        let positions = read.map(|all| all.into_iter().map(super::from_one).collect());
-        positions.transpose().map_err(D::Error::custom)
-    }
 }
 
 impl fmt::Display for ImagePair {
@@ -187,23 +182,23 @@ pub struct MapBounds {
 
 impl MapBounds {
     /// The rectangle that holds nothing, to be grown by [`MapBounds::including`].
-    pub(crate) const EMPTY: Self =
+    pub const EMPTY: Self =
         Self { x_min: f64::INFINITY, y_min: f64::INFINITY, x_max: f64::NEG_INFINITY, y_max: f64::NEG_INFINITY };
 
     /// Returns the smallest rectangle that holds this one and a point.
     #[must_use]
-    pub(crate) fn including(self, x: f64, y: f64) -> Self {
+    pub fn including(self, x: f64, y: f64) -> Self {
         Self { x_min: self.x_min.min(x), y_min: self.y_min.min(y), x_max: self.x_max.max(x), y_max: self.y_max.max(y) }
     }
 
     /// Returns whether the interiors of two rectangles meet.
-    pub(crate) fn meets(self, other: Self) -> bool {
+    pub fn meets(self, other: Self) -> bool {
         self.x_min < other.x_max && self.x_max > other.x_min && self.y_min < other.y_max && self.y_max > other.y_min
     }
 
     /// Returns the rectangle with x and y exchanged.
     #[must_use]
-    pub(crate) fn swapped(self) -> Self {
+    pub fn swapped(self) -> Self {
         Self { x_min: self.y_min, y_min: self.x_min, x_max: self.y_max, y_max: self.x_max }
     }
 
@@ -222,19 +217,6 @@ impl From<[f64; 4]> for MapBounds {
 impl From<MapBounds> for [f64; 4] {
     fn from(bounds: MapBounds) -> Self {
         bounds.to_array()
-    }
-}
-
-/// Serde adapter for a number that may be NaN, which JSON writes as `null`.
-pub(crate) mod null_is_nan {
-    use serde::{Deserialize, Deserializer, Serialize, Serializer};
-
-    pub(crate) fn serialize<S: Serializer>(value: &f64, out: S) -> Result<S::Ok, S::Error> {
-        value.serialize(out)
-    }
-
-    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(input: D) -> Result<f64, D::Error> {
-        Ok(Option::<f64>::deserialize(input)?.unwrap_or(f64::NAN))
     }
 }
 

@@ -12,18 +12,17 @@
 
 use std::collections::BTreeMap;
 
-use numeric::Progress;
+use numeric::{Muted, Progress};
 use rayon::prelude::*;
 use sweep::consistency::{ConsistencyConfig, Heights, count_agreeing};
 use sweep::ranges::{Ranges, Reach};
 use sweep::{CoarseGuide, HeightMap, LevelConfig, Prior, Reference, SweepError, SweepView, ViewLevel, sweep_level};
 
-use crate::error::DsmError;
+use crate::error::ReconstructError;
 use crate::planning::levels::SweepLevels;
-use crate::prior::prior_findings::PriorFindings;
-use crate::prior::prior_verdict::refuted;
-use crate::prior::prior_view::{DEVIATION_M, ViewPrior, tolerance_m};
-use crate::session::Muted;
+use crate::prior::findings::PriorFindings;
+use crate::prior::verdict::refuted;
+use crate::prior::view_prior::{DEVIATION_M, ViewPrior, tolerance_m};
 use crate::tuning::SweepTuning;
 use crate::values::HeightRange;
 
@@ -40,28 +39,29 @@ const COARSE_STEP: u8 = 20;
 
 /// Parameters of a sweep of all views.
 #[derive(Debug, Clone)]
-pub(crate) struct SceneSweep {
+pub struct SceneSweep {
     /// Heights to search.
-    pub(crate) range: HeightRange,
+    pub range: HeightRange,
     /// Distance of two hypotheses at full resolution, metres; each coarser level doubles it.
-    pub(crate) step_m: f64,
-    pub(crate) levels: SweepLevels,
+    pub step_m: f64,
+    /// Pyramid levels.
+    pub levels: SweepLevels,
     /// For each view, the views it is compared with.
-    pub(crate) sources: Vec<Vec<usize>>,
+    pub sources: Vec<Vec<usize>>,
     /// Distances around a coarse pixel from which heights are taken over.
-    pub(crate) reach: Reach,
+    pub reach: Reach,
     /// Penalty of a jump across the strongest image edges on the finest level.
-    pub(crate) jump_at_edge: u8,
+    pub jump_at_edge: u8,
     /// Lattices of pixels beside the images' own on which the finest level is swept: columns and
     /// rows, pixels of that level.
-    pub(crate) lattices_px: &'static [[f64; 2]],
+    pub lattices_px: &'static [[f64; 2]],
     /// For each view, what it sees of a city model; empty without a model.
-    pub(crate) priors: Vec<Option<ViewPrior>>,
+    pub priors: Vec<Option<ViewPrior>>,
 }
 
 impl SceneSweep {
     /// Returns the sweep of the images' own lattices, without a city model.
-    pub(crate) fn new(
+    pub fn new(
         range: HeightRange,
         step_m: f64,
         levels: SweepLevels,
@@ -73,48 +73,48 @@ impl SceneSweep {
     }
 
     /// Returns the distance of two hypotheses of a level, metres.
-    pub(crate) fn step_at(&self, level: usize) -> f64 {
+    pub fn step_at(&self, level: usize) -> f64 {
         self.step_m * f64::from(1u32 << level)
     }
 
     /// Returns the number of height maps that a view gets.
-    pub(crate) fn maps_per_view(&self) -> usize {
+    pub fn maps_per_view(&self) -> usize {
         self.levels.count() + self.lattices_px.len()
     }
 }
 
 /// Heights of all views on the finest level.
 #[derive(Debug, Clone)]
-pub(crate) struct SceneHeights {
+pub struct SceneHeights {
     /// One map per view.
-    pub(crate) maps: Vec<HeightMap>,
+    pub maps: Vec<HeightMap>,
     /// The same on other lattices of pixels than the images' own.
-    pub(crate) shifted: Vec<LatticeHeights>,
+    pub shifted: Vec<LatticeHeights>,
     /// Number of pixel-hypothesis pairs evaluated over all views and levels.
-    pub(crate) hypotheses: u64,
+    pub hypotheses: u64,
     /// Agreement of the heights of the last coarse level with the city model.
-    pub(crate) findings: PriorFindings,
+    pub findings: PriorFindings,
 }
 
 /// Heights of all views on one lattice of pixels.
 #[derive(Debug, Clone)]
-pub(crate) struct LatticeHeights {
+pub struct LatticeHeights {
     /// The views with the finest level on the lattice.
-    pub(crate) views: Vec<SweepView>,
+    pub views: Vec<SweepView>,
     /// One map per view.
-    pub(crate) maps: Vec<HeightMap>,
+    pub maps: Vec<HeightMap>,
 }
 
 /// Sweeps all views from the coarsest level to the finest, and the finest on all lattices. Each
 /// height map of a view is a step of `progress`.
 ///
 /// # Errors
-/// [`DsmError::Sweep`] as [`sweep_level`], [`DsmError::Cancelled`] between two levels.
-pub(crate) fn sweep_scene(
+/// [`ReconstructError::Sweep`] as [`sweep_level`], [`ReconstructError::Cancelled`] between two levels.
+pub fn sweep_scene(
     views: &[SweepView],
     sweep: &SceneSweep,
     progress: &dyn Progress,
-) -> Result<SceneHeights, DsmError> {
+) -> Result<SceneHeights, ReconstructError> {
     let SweepLevels { finest, coarsest } = sweep.levels;
     let none = PlacedModel { priors: vec![None; views.len()], findings: PriorFindings::default(), hypotheses: 0 };
     let model = if sweep.priors.iter().any(Option::is_some) {
@@ -132,7 +132,7 @@ pub(crate) fn sweep_scene(
         progress.check_cancelled()?;
         let (maps, evaluated) = sweep_views(views, sweep, lattice, (finest, coarse.last()), &model.priors, progress)?;
         hypotheses += evaluated;
-        Ok::<_, DsmError>(maps)
+        Ok::<_, ReconstructError>(maps)
     };
     let maps = finest_on(Lattice { references: views, offset_px: [0.0; 2], guides: &[] })?;
     let deeper = sweep_guides(views, sweep, &model.priors, progress)?;
@@ -158,7 +158,7 @@ fn sweep_guides(
     sweep: &SceneSweep,
     priors: &[Option<ViewPrior>],
     progress: &dyn Progress,
-) -> Result<Option<SweptLevels>, DsmError> {
+) -> Result<Option<SweptLevels>, ReconstructError> {
     let SweepLevels { finest, coarsest } = sweep.levels;
     let is_present = |view: &&SweepView| !view.levels[finest].data().is_empty();
     let shared = views.iter().filter(is_present).map(|view| view.levels.len() - 1).min().unwrap_or(finest);
@@ -204,7 +204,7 @@ fn sweep_down(
     levels: SweepLevels,
     priors: &[Option<ViewPrior>],
     progress: &dyn Progress,
-) -> Result<SweptLevels, DsmError> {
+) -> Result<SweptLevels, ReconstructError> {
     let mut out = SweptLevels { levels: Vec::new(), hypotheses: 0 };
     for level in (levels.finest..=levels.coarsest).rev() {
         progress.check_cancelled()?;

@@ -1,6 +1,7 @@
 //! Cells of the DSM that get no height: those under a mask, and those outside the area that was
 //! asked for.
 
+use reconstruct::{DsmGrid, GroundMask, MapBounds};
 use std::path::Path;
 
 use crs::MapProjection;
@@ -12,84 +13,60 @@ use raster::{GeoTransform, Grid, Window, mark_inside};
 
 use crate::config::DsmConfig;
 use crate::error::{DsmError, DsmSetting, axes_hint, degrees};
+use crate::masks::ground_polygons::{ground_around, holds_polygons, read_polygons, rings_in_cells};
 use crate::notes::Notes;
-use crate::planning::grid::{DsmGrid, lonlat_extent};
-use crate::sweeping::ground_polygons::{ground_around, holds_polygons, read_polygons, rings_in_cells};
-use crate::values::MapBounds;
+use crate::planning::grid::lonlat_extent;
 
 /// Cells of a grid that are looked at together for a mask that covers nothing.
 const STRIP_CELLS: usize = 1 << 22;
 
-/// Cells of a grid that get no height.
-#[derive(Debug, Clone)]
-pub(crate) struct GroundMask {
-    /// Cells under a mask. Heights found there are not trusted.
-    pub(crate) masked: Grid<bool>,
-    /// Cells outside the area.
-    pub(crate) outside: Grid<bool>,
+/// Finds the cells of a grid that a configuration excludes; `None` when it excludes none.
+///
+/// # Errors
+/// [`DsmError::Value`] for a raster without CRS, [`DsmError::Area`], [`DsmError::Image`],
+/// [`DsmError::Crs`].
+pub(crate) fn mask_on(config: &DsmConfig, grid: &DsmGrid) -> Result<Option<GroundMask>, DsmError> {
+    if config.masks.is_empty() && config.area.is_none() {
+        return Ok(None);
+    }
+    let map = grid.projection()?;
+    let none = Grid::filled(grid.size.0, grid.size.1, false);
+    let (mut masked, mut outside) = (none.clone(), none.clone());
+    for path in &config.masks {
+        match holds_polygons(path) {
+            true => mark_polygons(path, AreaName::ALL, grid, &map, &mut masked)?,
+            false => mark_raster(path, grid, &map, &mut masked)?,
+        }
+    }
+    if let Some(area) = &config.area {
+        let mut inside = none;
+        mark_polygons(&area.file, area.wanted(), grid, &map, &mut inside)?;
+        outside = inside.map(|inside| !inside);
+    }
+    Ok(Some(GroundMask { masked, outside }))
 }
 
-impl GroundMask {
-    /// Finds the cells of a grid that a configuration excludes; `None` when it excludes none.
-    ///
-    /// # Errors
-    /// [`DsmError::Value`] for a raster without CRS, [`DsmError::Area`], [`DsmError::Image`],
-    /// [`DsmError::Crs`].
-    pub(crate) fn on(config: &DsmConfig, grid: &DsmGrid) -> Result<Option<Self>, DsmError> {
-        if config.masks.is_empty() && config.area.is_none() {
-            return Ok(None);
+/// Checks that the files of a configuration can be used, before the images are read.
+///
+/// # Errors
+/// As [`mask_on`].
+pub(crate) fn check_masks(config: &DsmConfig) -> Result<(), DsmError> {
+    for path in &config.masks {
+        match holds_polygons(path) {
+            true => drop(io::areas::read(path, AreaName::ALL)?),
+            false => drop(MaskRaster::open(path)?),
         }
-        let map = grid.projection()?;
-        let none = Grid::filled(grid.size.0, grid.size.1, false);
-        let (mut masked, mut outside) = (none.clone(), none.clone());
-        for path in &config.masks {
-            match holds_polygons(path) {
-                true => mark_polygons(path, AreaName::ALL, grid, &map, &mut masked)?,
-                false => mark_raster(path, grid, &map, &mut masked)?,
-            }
-        }
-        if let Some(area) = &config.area {
-            let mut inside = none;
-            mark_polygons(&area.file, area.wanted(), grid, &map, &mut inside)?;
-            outside = inside.map(|inside| !inside);
-        }
-        Ok(Some(Self { masked, outside }))
     }
-
-    /// Checks that the files of a configuration can be used, before the images are read.
-    ///
-    /// # Errors
-    /// As [`Self::on`].
-    pub(crate) fn check(config: &DsmConfig) -> Result<(), DsmError> {
-        for path in &config.masks {
-            match holds_polygons(path) {
-                true => drop(io::areas::read(path, AreaName::ALL)?),
-                false => drop(MaskRaster::open(path)?),
-            }
-        }
-        if let Some(area) = &config.area {
-            io::areas::read(&area.file, area.wanted())?;
-        }
-        Ok(())
+    if let Some(area) = &config.area {
+        io::areas::read(&area.file, area.wanted())?;
     }
-
-    /// Returns whether no cell of a window gets a height.
-    pub(crate) fn excludes_all(&self, cells: Window) -> bool {
-        let columns = self.masked.width();
-        let row = |y: usize| (y * columns + cells.x as usize)..(y * columns + cells.x as usize + cells.width);
-        (cells.y as usize..cells.y as usize + cells.height).flat_map(row).all(|cell| self.excludes(cell))
-    }
-
-    /// Returns whether a cell gets no height.
-    pub(crate) fn excludes(&self, cell: usize) -> bool {
-        self.masked.data()[cell] || self.outside.data()[cell]
-    }
+    Ok(())
 }
 
 /// Warns of each mask that covers no cell of a grid.
 ///
 /// # Errors
-/// As [`GroundMask::on`].
+/// As [`mask_on`].
 pub(crate) fn warn_of_masks(config: &DsmConfig, grid: &DsmGrid, notes: &mut Notes<'_>) -> Result<(), DsmError> {
     let map = grid.projection()?;
     let scene = lonlat_extent(grid.bounds(), &map)?;

@@ -1,15 +1,8 @@
 //! The agreement of the swept heights with the buildings of a city model.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
-
-use crate::notes::Notes;
-use crate::report::{LeftOut, PriorReport};
-
-/// Number of buildings that are named in the choice; the report names all.
-const NAMED: usize = 3;
 
 /// Agreement of the heights of several views, or chunks, with the buildings of a city model.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -81,7 +74,7 @@ impl PriorFindings {
 
     /// Sets the identifiers of the buildings, given in the order of their numbers.
     #[must_use]
-    pub(crate) fn named(mut self, ids: &[String]) -> Self {
+    pub fn named(mut self, ids: &[String]) -> Self {
         for (number, building) in &mut self.buildings {
             building.id = ids.get((*number as usize).wrapping_sub(1)).cloned().unwrap_or_default();
         }
@@ -89,7 +82,7 @@ impl PriorFindings {
     }
 
     /// Adds the findings of a chunk.
-    pub(crate) fn extend(&mut self, other: &Self) {
+    pub fn extend(&mut self, other: &Self) {
         self.tolerance_m = self.tolerance_m.max(other.tolerance_m);
         self.disagreeing_views += other.disagreeing_views;
         for (&number, theirs) in &other.buildings {
@@ -97,42 +90,6 @@ impl PriorFindings {
             own.id.clone_from(&theirs.id);
             own.kept.add(theirs.kept);
             own.gone.add(theirs.gone);
-        }
-    }
-
-    /// Reports the buildings that were left out, and why.
-    pub(crate) fn report(&self, model: PathBuf, notes: &mut Notes<'_>) -> PriorReport {
-        let left_out: Vec<LeftOut> = self
-            .buildings
-            .values()
-            .filter(|building| building.gone.views > 0)
-            .map(|building| LeftOut {
-                id: building.id.clone(),
-                views: building.gone.views,
-                of_views: building.gone.views + building.kept.views,
-                agreeing_pixels: building.gone.agreeing_pixels,
-                compared_pixels: building.gone.compared_pixels,
-            })
-            .collect();
-        let names: Vec<&str> = left_out.iter().take(NAMED).map(|building| building.id.as_str()).collect();
-        let more = if left_out.len() > NAMED { ", …" } else { "" };
-        let value = match left_out.len() {
-            0 if self.disagreeing_views > 0 => format!(
-                "none of {}; {} views agree with nothing of the model and do without",
-                self.buildings.len(),
-                self.disagreeing_views
-            ),
-            0 => format!("none of {}", self.buildings.len()),
-            count => format!("{count} of {}: {}{more}", self.buildings.len(), names.join(", ")),
-        };
-        let reason = "the images alone show other heights there, or nothing where much of the model is wrong";
-        notes.choose("buildings left out", value, reason);
-        PriorReport {
-            model,
-            buildings_seen: self.buildings.len(),
-            disagreeing_views: self.disagreeing_views,
-            tolerance_m: f64::from(self.tolerance_m),
-            left_out,
         }
     }
 }

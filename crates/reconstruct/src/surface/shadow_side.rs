@@ -52,8 +52,10 @@ pub struct ShadowCounts {
 
 /// Side of the jumps on which the shadows lie.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum ShadowSide {
+pub enum ShadowSide {
+    /// The lower one, as shadows of a relief that stands upright do.
     Low,
+    /// The higher one: the relief is upside down.
     High,
 }
 
@@ -61,7 +63,7 @@ impl ShadowCounts {
     /// Counts at the pixels of a height map with an image of the same size. `keep` marks the
     /// heights that other views confirm, `pixel_m` is a pixel on the ground and `step_m` the
     /// distance of two hypotheses.
-    pub(crate) fn of(image: &Grid<f32>, map: &HeightMap, keep: &Grid<bool>, pixel_m: f64, step_m: f64) -> Self {
+    pub fn of(image: &Grid<f32>, map: &HeightMap, keep: &Grid<bool>, pixel_m: f64, step_m: f64) -> Self {
         let mut counts = Self::default();
         let kept = image.data().iter().zip(keep.data()).filter(|(value, keep)| **keep && value.is_finite());
         let mut values: Vec<f32> = kept.map(|(value, _)| *value).collect();
@@ -97,7 +99,7 @@ impl ShadowCounts {
     }
 
     /// Adds the counts of another part of the image.
-    pub(crate) fn add(&mut self, other: &Self) {
+    pub fn add(&mut self, other: &Self) {
         let add = |own: &mut [u64; 8], other: &[u64; 8]| {
             own.iter_mut().zip(other).for_each(|(a, b)| *a = a.saturating_add(*b))
         };
@@ -123,7 +125,7 @@ impl ShadowCounts {
 
 /// Returns the side on which the shadows of all views lie; `None` where they do not tell. The views
 /// are judged together, because one alone may have its dark trees or roofs on one side.
-pub(crate) fn shadow_side<'a>(views: impl Iterator<Item = &'a ShadowCounts>) -> Option<ShadowSide> {
+pub fn shadow_side<'a>(views: impl Iterator<Item = &'a ShadowCounts>) -> Option<ShadowSide> {
     let telling = views.filter(|view| view.jumps.iter().sum::<u64>() >= JUMPS_MIN);
     let amplitudes: Vec<[f64; 2]> =
         telling.map(|view| [&view.dark_low, &view.dark_high].map(|dark| view.amplitude(dark))).collect();

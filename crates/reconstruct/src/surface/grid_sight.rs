@@ -14,8 +14,8 @@ use rayon::prelude::*;
 use sweep::SweepView;
 use sweep::fusion::GridSight;
 
-use crate::error::DsmError;
-use crate::planning::grid::DsmGrid;
+use crate::error::ReconstructError;
+use crate::grid::DsmGrid;
 
 /// Distance of the lattice's cells. Over so few cells an RPC is linear to far below a pixel.
 const LATTICE: usize = 32;
@@ -62,13 +62,13 @@ impl ViewPixels {
 /// view whose camera fails in the middle of the grid sees nothing.
 ///
 /// # Errors
-/// [`DsmError::Crs`].
+/// [`ReconstructError::Crs`].
 pub(crate) fn grid_sights(
     views: &[ViewPixels],
     grid: &DsmGrid,
     height_m: &Grid<f32>,
     origin_m: f64,
-) -> Result<Vec<GridSight>, DsmError> {
+) -> Result<Vec<GridSight>, ReconstructError> {
     let projection = grid.projection()?;
     let lattice = Lattice::new(grid, &projection, height_m, origin_m)?;
     let sight = |view: &ViewPixels| {
@@ -104,7 +104,12 @@ struct Lattice {
 }
 
 impl Lattice {
-    fn new(grid: &DsmGrid, projection: &MapProjection, height_m: &Grid<f32>, origin_m: f64) -> Result<Self, DsmError> {
+    fn new(
+        grid: &DsmGrid,
+        projection: &MapProjection,
+        height_m: &Grid<f32>,
+        origin_m: f64,
+    ) -> Result<Self, ReconstructError> {
         let (columns, rows) = (grid.size.0.div_ceil(LATTICE) + 1, grid.size.1.div_ceil(LATTICE) + 1);
         let mut x = Vec::with_capacity(columns * rows);
         let mut y = Vec::with_capacity(columns * rows);

@@ -1,13 +1,11 @@
-//! The rasters of a chunk.
+//! The rasters of a surface.
 
 use raster::{Grid, Window};
-use surfaces::surface_layer::{FILLED, OBSERVED, VOID};
-use sweep::fusion::{CellSource, FusedSurface};
+use sweep::fusion::{CellSource, FILLED, FusedSurface, VOID};
 
-/// The rasters of a chunk, all of one size.
+/// The rasters of a surface, all of one size.
 #[derive(Debug, Clone)]
-#[non_exhaustive]
-pub struct ChunkRasters {
+pub struct SurfaceRasters {
     /// Height above the ellipsoid from which `height_m` counts, metres.
     pub origin_m: f64,
     /// Heights above the origin, metres; NaN in voids.
@@ -25,16 +23,11 @@ pub struct ChunkRasters {
     pub source: Grid<u8>,
 }
 
-impl ChunkRasters {
+impl SurfaceRasters {
     /// Makes the rasters of a surface after its clean-up. `source` says where each
     /// height comes from.
-    pub(crate) fn new(fused: FusedSurface, source: &Grid<CellSource>, origin_m: f64) -> Self {
-        let mark = |source: &CellSource| match source {
-            CellSource::Observed => OBSERVED,
-            source if source.is_filled() => FILLED,
-            _ => VOID,
-        };
-        let marks = source.map(mark);
+    pub fn new(fused: FusedSurface, source: &Grid<CellSource>, origin_m: f64) -> Self {
+        let marks = source.map(|source| source.filled_flag());
         let FusedSurface { height_m, mut sigma_m, mut views, mut confidence, .. } = fused;
         for (i, h) in height_m.data().iter().enumerate() {
             if h.is_nan() {
@@ -52,7 +45,7 @@ impl ChunkRasters {
     }
 
     /// Makes the rasters of cells that all get no height.
-    pub(crate) fn masked(size: (usize, usize)) -> Self {
+    pub fn masked(size: (usize, usize)) -> Self {
         let void = Grid::filled(size.0, size.1, f32::NAN);
         Self {
             origin_m: 0.0,
@@ -67,7 +60,7 @@ impl ChunkRasters {
 
     /// Returns the cells of a window inside.
     #[must_use]
-    pub(crate) fn cropped(self, cells: Window) -> Self {
+    pub fn cropped(self, cells: Window) -> Self {
         if cells == Window::whole(self.height_m.width(), self.height_m.height()) {
             return self;
         }

@@ -4,7 +4,32 @@ use serde::{Deserialize, Serialize};
 use sweep::aggregation::Penalties;
 use sweep::ranges::{EDGE_REACH, Reach};
 
-use crate::config::Preset;
+/// Trade-off of speed and accuracy.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Preset {
+    /// Half the resolution of the images in matching and in the DSM, and two sources per view.
+    Fast,
+    /// Full resolution, up to four sources per view, and two lattices of pixels.
+    #[default]
+    Balanced,
+    /// Full resolution, up to eight sources per view, four lattices of pixels, and sharper edges of
+    /// roofs.
+    Accurate,
+}
+
+impl Preset {
+    /// All values with the names that people give them, and their meanings.
+    pub const CHOICES: [(&'static str, Self, &'static str); 3] = [
+        ("fast", Self::Fast, "half the resolution in matching and in the DSM, two sources per view"),
+        ("balanced", Self::Balanced, "full resolution, up to four sources per view, matched on two lattices of pixels"),
+        (
+            "accurate",
+            Self::Accurate,
+            "full resolution, up to eight sources per view, matched on four lattices of pixels",
+        ),
+    ];
+}
 
 /// Parameters of the sweep. The remaining ones are the same for all presets: the defaults of
 /// [`sweep::LevelConfig`].
@@ -53,12 +78,12 @@ const LATTICES_PX: [[f64; 2]; 3] = [[0.5, 0.5], [0.5, 0.0], [0.0, 0.5]];
 impl Preset {
     /// Returns the side of a cell where none is given, in pixels of the coarsest image: that of the
     /// pixels matched.
-    pub(crate) fn pixels_per_cell(self) -> f64 {
+    pub fn pixels_per_cell(self) -> f64 {
         f64::from(1u32 << self.tuning().finest_level)
     }
 
     /// Returns the parameters of the preset.
-    pub(crate) fn tuning(self) -> SweepTuning {
+    pub fn tuning(self) -> SweepTuning {
         let usual = Penalties::default().jump_at_edge;
         let balanced = SweepTuning {
             step_px: 0.5,
@@ -89,12 +114,12 @@ impl Preset {
 
 impl SweepTuning {
     /// Returns the lattices of pixels beside the images' own, pixels of the finest level.
-    pub(crate) fn lattices_px(&self) -> &'static [[f64; 2]] {
+    pub fn lattices_px(&self) -> &'static [[f64; 2]] {
         &LATTICES_PX[..self.lattices.clamp(1, LATTICES_PX.len() + 1) - 1]
     }
 
     /// Returns from where heights to search are taken over.
-    pub(crate) fn reaches(&self) -> Reach {
+    pub fn reaches(&self) -> Reach {
         Reach { above: self.reach, below: self.reach_below.max(self.reach) }
     }
 }

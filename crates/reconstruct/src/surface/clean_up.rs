@@ -11,7 +11,7 @@ use sweep::fusion::{
 };
 use terrain::{GroundConfig, bare_ground_of_observed, goes_through_roofs};
 
-use crate::config::Fill;
+use crate::surface::fill::Fill;
 
 /// Isolated patches of less ground than a square of this side are speckle, metres: smaller than the
 /// crown of a single tree or a car port.
@@ -65,7 +65,7 @@ const RIGHT_M: f64 = 1.0;
 /// Width of the ground around a cell that decides its content, metres: speckle is
 /// judged, then voids are filled from this far. What hides a void stands nearer, unless it is a
 /// tower of more than 100 m: in a chunk the void then counts as seen at the far end of its shadow.
-pub(crate) const SURROUNDINGS_M: f64 = FILL_REACH_FAR_M + 2.0 * SPECKLE_SIDE_M;
+pub const SURROUNDINGS_M: f64 = FILL_REACH_FAR_M + 2.0 * SPECKLE_SIDE_M;
 
 /// What is known about the voids of a surface.
 #[derive(Clone, Copy)]

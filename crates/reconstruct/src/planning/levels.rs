@@ -3,7 +3,6 @@
 use raster::Window;
 use serde::{Deserialize, Serialize};
 
-use crate::notes::Notes;
 use crate::tuning::SweepTuning;
 use crate::values::HeightRange;
 
@@ -14,7 +13,7 @@ const TOP_SIDE_MIN: usize = 48;
 /// [`sweep::SweepView::new`].
 const PYRAMID_SIDE_MIN: usize = 32;
 /// Number of levels at which the pyramid of a view stops.
-pub(crate) const PYRAMID_LEVELS_MAX: usize = 16;
+pub const PYRAMID_LEVELS_MAX: usize = 16;
 
 /// Pyramid levels of a sweep; 0 is the full resolution.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -28,55 +27,36 @@ pub struct SweepLevels {
 
 impl SweepLevels {
     /// Returns the levels of a sweep of one level only.
-    pub(crate) const fn only(level: usize) -> Self {
+    pub const fn only(level: usize) -> Self {
         Self { finest: level, coarsest: level }
     }
 
     /// Returns the number of levels.
-    pub(crate) const fn count(self) -> usize {
+    pub const fn count(self) -> usize {
         self.coarsest - self.finest + 1
     }
 }
 
 /// Returns the distance of two hypotheses at full resolution, metres. `widest` is the largest
 /// parallax, pixels per metre.
-pub(crate) fn height_step_m(widest: f64, tuning: &SweepTuning) -> f64 {
+pub fn height_step_m(widest: f64, tuning: &SweepTuning) -> f64 {
     tuning.step_px / widest.max(f64::MIN_POSITIVE)
-}
-
-/// Notes the choice of [`height_step_m`].
-pub(crate) fn note_step(widest: f64, tuning: &SweepTuning, notes: &mut Notes<'_>) {
-    notes.choose(
-        "height step",
-        format!("{:.3} m", height_step_m(widest, tuning)),
-        format!("{} px of parallax in the pair that sees most of it ({widest:.3} px/m)", tuning.step_px),
-    );
 }
 
 /// Chooses the levels of a sweep of views. `sides` are the shortest sides of the views' levels, see
 /// [`smallest_sides`].
-pub(crate) fn choose_levels(range: HeightRange, step_m: f64, sides: &[usize], tuning: &SweepTuning) -> SweepLevels {
+pub fn choose_levels(range: HeightRange, step_m: f64, sides: &[usize], tuning: &SweepTuning) -> SweepLevels {
     let deepest = sides.iter().filter(|s| **s >= TOP_SIDE_MIN).count().saturating_sub(1);
     let too_many = |level: &usize| range.span_m() / (step_m * f64::from(1u32 << *level)) > tuning.top_hypotheses;
     let finest = tuning.finest_level.min(deepest);
     SweepLevels { finest, coarsest: (0..deepest).take_while(too_many).count().max(finest) }
 }
 
-/// Notes the choice of [`choose_levels`].
-pub(crate) fn note_levels(levels: SweepLevels, range: HeightRange, step_m: f64, notes: &mut Notes<'_>) {
-    let hypotheses = range.span_m() / (step_m * f64::from(1u32 << levels.coarsest));
-    notes.choose(
-        "pyramid",
-        format!("{} levels", levels.count()),
-        format!("{hypotheses:.0} hypotheses over the whole range on the coarsest"),
-    );
-}
-
 /// Returns, for each pyramid level that the views of all windows have, the shortest side of any of
 /// them, pixels.
 ///
 /// The sizes follow from those of the windows, so that a plan can be made without the pixels.
-pub(crate) fn smallest_sides<'a>(windows: impl IntoIterator<Item = &'a Window>) -> Vec<usize> {
+pub fn smallest_sides<'a>(windows: impl IntoIterator<Item = &'a Window>) -> Vec<usize> {
     let Some(side) = windows.into_iter().map(|w| w.width.min(w.height)).min() else { return Vec::new() };
     let reduced = |side: &usize| Some(side.div_ceil(2)).filter(|s| *s >= PYRAMID_SIDE_MIN);
     std::iter::successors(Some(side), reduced).take(PYRAMID_LEVELS_MAX).collect()

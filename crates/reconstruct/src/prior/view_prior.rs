@@ -11,7 +11,7 @@ use raster::Grid;
 use rayon::prelude::*;
 use sweep::HeightMap;
 
-use crate::prior::prior_verdict::densest;
+use crate::prior::verdict::densest;
 
 /// Standard deviation of the heights of city models, metres: roofs of LoD2 models lie within half a
 /// metre of laser heights.
@@ -35,13 +35,13 @@ const MOVE_GAIN: f64 = 0.05;
 
 /// What one view sees of the model, at its full resolution.
 #[derive(Debug, Clone)]
-pub(crate) struct ViewPrior {
+pub struct ViewPrior {
     /// Heights of the model, metres above the ellipsoid; NaN where there is no building.
-    pub(crate) height_m: Grid<f32>,
+    pub height_m: Grid<f32>,
     /// Number of the building, [`NO_OBJECT`] where there is none.
-    pub(crate) object: Grid<u32>,
+    pub object: Grid<u32>,
     /// Side of a pixel on the ground, metres.
-    pub(crate) gsd_m: f64,
+    pub gsd_m: f64,
 }
 
 /// A shift of the model in a view.

@@ -13,11 +13,11 @@ const HELPED_MIN: f64 = 0.1;
 const MOST_TIMES: usize = 2;
 
 /// Places of an image that need partners.
-pub(crate) struct Places(Vec<Point<f64>>);
+pub struct Places(Vec<Point<f64>>);
 
 impl Places {
     /// Returns the places of a lattice that lie in an outline.
-    pub(crate) fn over(outline: &Polygon<f64>) -> Self {
+    pub fn over(outline: &Polygon<f64>) -> Self {
         let Some(rect) = outline.bounding_rect() else { return Self(Vec::new()) };
         let along = |i: usize, from: f64, length: f64| from + (i as f64 + 0.5) / FIELDS as f64 * length;
         let at = |i: usize, j: usize| {
@@ -29,7 +29,7 @@ impl Places {
 
     /// Chooses partners from candidates with their outlines, the best ones first. The best `usual`
     /// ones are taken. Further ones are taken where places have fewer than `usual`.
-    pub(crate) fn choose<'a>(
+    pub fn choose<'a>(
         &self,
         candidates: impl IntoIterator<Item = (usize, &'a Polygon<f64>)>,
         usual: usize,
