@@ -39,9 +39,9 @@
 //!   cameras).
 //! - Surfaces: [`raster`] (grids), [`city`] (city models), [`gaussian`] (splats), [`bvh`] (ray
 //!   casting), [`occlusion`].
-//! - Methods: [`sweep`] (the height sweep), [`reconstruct`] (views in memory to a surface), [`eval`], [`priors`], [`heightmap`], [`groundview`],
-//!   [`ortho`], [`splats`], [`terrain`], [`train`], [`tsdf`], [`change`],
-//!   [`classes`], [`buildings`], [`simulate`].
+//! - Methods: [`sweep`] (the height sweep), [`reconstruct`] (from views in memory to a surface),
+//!   [`eval`], [`priors`], [`heightmap`], [`groundview`], [`ortho`], [`splats`], [`terrain`],
+//!   [`train`], [`tsdf`], [`change`], [`classes`], [`buildings`], [`simulate`].
 //! - Files: [`io`] reads and writes rasters, cameras, points and splats, [`cityfiles`] city models
 //!   and meshes, and [`report`] makes pictures and pages.
 //! - [`numeric`] has progress and cancellation, seeded random numbers and order statistics.

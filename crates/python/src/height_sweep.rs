@@ -20,7 +20,7 @@ type Found<'py> = (
     Bound<'py, PyArray2<u8>>,
 );
 
-/// Geotransform, heights, standard deviations, probabilities, numbers of views and sources of cells.
+/// Geotransform, heights, standard deviations, probabilities, numbers of views and sources.
 type Surface<'py> = (
     [f64; 6],
     Bound<'py, PyArray2<f32>>,

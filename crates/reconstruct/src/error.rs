@@ -4,8 +4,7 @@ use crs::CrsError;
 use numeric::{Kind, failures};
 use sweep::SweepError;
 
-use crate::grid::CELLS_MAX;
-use crate::values::HeightRange;
+use crate::values::{CELLS_MAX, HeightRange};
 
 /// Reason why views give no heights or no surface.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

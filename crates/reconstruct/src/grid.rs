@@ -5,10 +5,7 @@ use raster::{GeoTransform, Window};
 use serde::{Deserialize, Serialize};
 
 use crate::error::ReconstructError;
-use crate::values::MapBounds;
-
-/// Grids of more cells than this come from a cell size or bounds in wrong units.
-pub const CELLS_MAX: f64 = 4e9;
+use crate::values::{CELLS_MAX, MapBounds};
 
 /// The grid of a DSM.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -79,8 +79,10 @@ pub fn sweep_views(
 /// let geotransform = GeoTransform([500_000.0, 0.5, 0.0, 4_800_000.0, 0.0, -0.5]);
 /// let grid = DsmGrid { epsg: 32631, geotransform, size: (400, 300), gsd_m: 0.5 };
 /// let range = HeightRange::new(170.0, 280.0);
-/// let (rasters, counts) = surface_of_views(images, &grid, range, Preset::Balanced, Fill::Justified, &Silent)?;
-/// println!("{} cells observed, the first one at {} m", counts.observed, rasters.origin_m + f64::from(rasters.height_m[(0, 0)]));
+/// let (preset, fill) = (Preset::Balanced, Fill::Justified);
+/// let (rasters, counts) = surface_of_views(images, &grid, range, preset, fill, &Silent)?;
+/// let first_m = rasters.origin_m + f64::from(rasters.height_m[(0, 0)]);
+/// println!("{} cells observed, the first one at {first_m} m", counts.observed);
 /// # Ok::<(), reconstruct::ReconstructError>(())
 /// ```
 pub fn surface_of_views(

@@ -32,7 +32,7 @@ mod tuning;
 mod values;
 
 pub use error::ReconstructError;
-pub use grid::{CELLS_MAX, DsmGrid, cell_size, snapped};
+pub use grid::{DsmGrid, cell_size, snapped};
 pub use in_memory::{ViewHeights, ViewImage, surface_of_views, sweep_views};
 pub use planning::footprints::{footprint, local_polygon, overlap_share, shared_ground, shared_part};
 pub use planning::levels::{PYRAMID_LEVELS_MAX, SweepLevels, choose_levels, height_step_m, smallest_sides};
@@ -51,4 +51,4 @@ pub use surface::make::{KeptPixels, SurfaceCounts, SurfaceInput, SurfaceOptions,
 pub use surface::rasters::SurfaceRasters;
 pub use surface::shadow_side::{ShadowCounts, ShadowSide, shadow_side};
 pub use tuning::{Preset, SweepTuning};
-pub use values::{HeightRange, ImagePair, MapBounds, index_of_position};
+pub use values::{CELLS_MAX, HeightRange, ImagePair, MapBounds, index_of_position};

@@ -109,7 +109,8 @@ pub struct LatticeHeights {
 /// height map of a view is a step of `progress`.
 ///
 /// # Errors
-/// [`ReconstructError::Sweep`] as [`sweep_level`], [`ReconstructError::Cancelled`] between two levels.
+/// [`ReconstructError::Sweep`] as [`sweep_level`], [`ReconstructError::Cancelled`] between two
+/// levels.
 pub fn sweep_scene(
     views: &[SweepView],
     sweep: &SceneSweep,

@@ -8,6 +8,9 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
+/// Grids of more cells than this come from a cell size or bounds in wrong units.
+pub const CELLS_MAX: f64 = 4e9;
+
 /// A range of heights, metres above the ellipsoid. It is written as `[low, high]`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(from = "[f64; 2]", into = "[f64; 2]")]

@@ -4,8 +4,12 @@ use crate::preset_names::PRESETS;
 
 /// A scene that cannot be simulated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum SimulateError {
+#[error(transparent)]
+pub struct SimulateError(#[from] pub(crate) Reason);
+
+/// Why a scene cannot be simulated.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub(crate) enum Reason {
     /// A number of the configuration lies outside its range.
     #[error("{name} is {found}, expected {low} to {high}")]
     OutOfRange {
@@ -40,6 +44,19 @@ pub enum SimulateError {
     #[error("no map projection is defined at the place of the scene")]
     Geodesy(#[from] crs::CrsError),
 }
+
+/// Lets `?` take the errors of other crates in one step.
+macro_rules! from_others {
+    ($($error:ty),+) => {$(
+        impl From<$error> for SimulateError {
+            fn from(error: $error) -> Self {
+                Self(error.into())
+            }
+        }
+    )+};
+}
+
+from_others!(camera::CameraError, camera::FitError, crs::CrsError);
 
 /// Asks for the nearest name, where one is near.
 fn meant(found: &str) -> String {

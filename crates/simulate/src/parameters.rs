@@ -4,7 +4,7 @@
 //! unknown key is an error that lists the known keys.
 
 use crate::config::SimulationConfig;
-use crate::error::SimulateError;
+use crate::error::{Reason, SimulateError};
 use crate::views::sun::Sun;
 
 /// The key of a parameter file that names the preset it starts from.
@@ -21,12 +21,12 @@ impl SimulationConfig {
     /// Text that is no TOML, an unknown preset, an unknown key, a value of the wrong type or out of
     /// range.
     pub fn from_toml(text: &str) -> Result<Self, SimulateError> {
-        let refused = |error: toml::de::Error| SimulateError::Parameters { text: error.to_string().trim().to_owned() };
+        let refused = |error: toml::de::Error| Reason::Parameters { text: error.to_string().trim().to_owned() };
         let mut given: toml::Table = toml::from_str(text).map_err(refused)?;
         let preset = match given.remove(PRESET_KEY) {
             None => Self::default(),
             Some(toml::Value::String(name)) => Self::preset(&name)?,
-            Some(other) => return Err(SimulateError::UnknownPreset { found: other.to_string() }),
+            Some(other) => return Err(Reason::UnknownPreset { found: other.to_string() }.into()),
         };
         let mut merged = preset.to_table()?;
         overlay(&mut merged, given);
@@ -40,12 +40,12 @@ impl SimulationConfig {
     /// # Errors
     /// A seed beyond what TOML can hold (2⁶³ − 1).
     pub fn to_toml(&self) -> Result<String, SimulateError> {
-        let refused = |error: toml::ser::Error| SimulateError::Parameters { text: error.to_string() };
-        toml::to_string(&self.to_table()?).map_err(refused)
+        let refused = |error: toml::ser::Error| Reason::Parameters { text: error.to_string() };
+        Ok(toml::to_string(&self.to_table()?).map_err(refused)?)
     }
 
     fn to_table(&self) -> Result<toml::Table, SimulateError> {
-        toml::Table::try_from(self).map_err(|error| SimulateError::Parameters { text: error.to_string() })
+        toml::Table::try_from(self).map_err(|error| Reason::Parameters { text: error.to_string() }.into())
     }
 
     /// Checks every number.
@@ -154,7 +154,7 @@ impl SimulationConfig {
 fn within(name: &'static str, found: f64, low: f64, high: f64) -> Result<(), SimulateError> {
     match (low..=high).contains(&found) {
         true => Ok(()),
-        false => Err(SimulateError::OutOfRange { name, found, low, high }),
+        false => Err(Reason::OutOfRange { name, found, low, high }.into()),
     }
 }
 

@@ -5,7 +5,7 @@ use crate::config::{
     MultispectralConfig, QuarterWeights, SensorConfig, SimulationConfig, TerrainConfig, VegetationConfig,
     VehiclesConfig,
 };
-use crate::error::SimulateError;
+use crate::error::{Reason, SimulateError};
 use crate::views::seasons::SeasonsConfig;
 use crate::views::sun::Sun;
 
@@ -116,7 +116,7 @@ impl SimulationConfig {
     /// Returns the configuration of a name in [`PRESETS`](crate::PRESETS).
     ///
     /// # Errors
-    /// [`SimulateError::UnknownPreset`], which lists the names.
+    /// A name that no preset has; the text lists the names.
     pub fn preset(name: &str) -> Result<Self, SimulateError> {
         let town = Self::default();
         Ok(match name {
@@ -132,7 +132,7 @@ impl SimulationConfig {
             "dense-towers" => dense_towers(town),
             "industrial" => industrial(town),
             "low-texture" => Self { surface: AppearanceConfig { contrast: 0.12, ..town.surface }, ..town },
-            _ => return Err(SimulateError::UnknownPreset { found: name.to_owned() }),
+            _ => return Err(Reason::UnknownPreset { found: name.to_owned() }.into()),
         })
     }
 }

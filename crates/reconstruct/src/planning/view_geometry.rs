@@ -58,8 +58,8 @@ impl ViewGeometry {
     /// Computes the geometry at `height_m`, metres above the ellipsoid.
     ///
     /// # Errors
-    /// [`ReconstructError::Camera`] for an image without a footprint, [`ReconstructError::NoOverlap`] when no two
-    /// images share ground.
+    /// [`ReconstructError::Camera`] for an image without a footprint,
+    /// [`ReconstructError::NoOverlap`] when no two images share ground.
     pub fn at(images: &[ImageGeometry<'_>], height_m: f64) -> Result<Self, ReconstructError> {
         let failed = |view: usize| move |source: CameraError| ReconstructError::Camera { view, source };
         let prints: Vec<Vec<LonLatHeight>> = images
