@@ -13,6 +13,7 @@ use crate::forest::{forests, roughness};
 use crate::heights::Heights;
 use crate::membrane::filled;
 use crate::objects::{objects, radii};
+use crate::outliers::OffPlanes;
 use crate::pits::pits;
 use crate::plate::plate;
 use crate::regions::quantile;
@@ -127,6 +128,8 @@ pub fn bare_ground_of_observed(
             let whole_m = without_pits(&without_cells(&whole_m, &is_pit));
             let surface_m = without_cells(&whole_m, &is_void);
             let evidence_m = without_cells(&surface_m, &islands(&surface_m, work_m));
+            let is_sunken = OffPlanes::new(&evidence_m, work_m, noise_m, config).sunken();
+            let evidence_m = without_cells(&evidence_m, &is_sunken);
             (whole_m, surface_m, evidence_m)
         }
         // Voids between the points of a cloud are usual: they make no islands, and hide no drops.
@@ -153,6 +156,10 @@ pub fn bare_ground_of_observed(
             let again =
                 objects(&heights, (&trend(&known, work_m, later), &smooth_slopes(&known, work_m)), config, progress)?;
             add(&mut found, &again);
+        }
+        // The points of a cloud show the whole border of what stands out.
+        if unobserved.is_some() {
+            found = OffPlanes::new(&evidence_m, work_m, noise_m, config).no_ground(&clear_m, &found);
         }
     }
     let hidden_m = unobserved.map(|_| &evidence_m);

@@ -14,6 +14,9 @@
 //!    off has no such border, and stays. The search is done three times, on the surface relative to
 //!    its trend, so that slopes do not hide low halls. The first trend follows the lower part of
 //!    the surface, the others the ground that the searches before have left, the last one closely.
+//!    In surfaces with unobserved cells, planes that turn away from what lies off wider ones judge
+//!    what openings mistake on slopes: roofs that are flush with the ground uphill, and roofs that
+//!    the matching carried on into it. They bring ground back that an opening cut off, too.
 //! 3. What is left of objects is taken away: small parts off the plate through the large ones, and
 //!    parts a storey above the largest. Ground that was taken away **joins again** where it lies at
 //!    the ground expected from that around it, within a tolerance that grows with the slope.
@@ -37,6 +40,7 @@ mod heights;
 mod membrane;
 mod narrow;
 mod objects;
+mod outliers;
 mod pits;
 mod plate;
 mod regions;

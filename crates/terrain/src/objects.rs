@@ -14,7 +14,7 @@ use crate::regions::{Regions, quantile};
 /// Growth of the half-width from one window to the next.
 const GROWTH: f64 = 1.33;
 /// Share of the height of a candidate that the surface must drop along its border.
-const DROP_SHARE: f32 = 0.45;
+pub(crate) const DROP_SHARE: f32 = 0.45;
 /// Share of the border of an object along which the surface need not drop: slopes, and houses and
 /// trees that adjoin.
 pub(crate) const FREE_SHARE: f64 = 0.35;
@@ -123,7 +123,8 @@ impl Candidates<'_> {
     /// Whether the surface drops by the height of a region along its border, except for a share.
     fn drops(&self, regions: &Regions, region: usize, free_share: f64) -> bool {
         let height = regions.median(region, |cell| self.left.data()[cell] - self.low.data()[cell]).unwrap_or(0.0);
-        match quantile(&mut regions.drops_m(region, self.around, self.cell_m), free_share) {
+        let drops = regions.drops_m(region, self.around, self.cell_m).into_iter();
+        match quantile(&mut drops.map(|(_, drop)| drop).collect::<Vec<f32>>(), free_share) {
             Some(drop) => drop >= DROP_SHARE * height,
             // Between voids alone, a low candidate cannot be told from ground.
             None => regions.median(region, |cell| self.left.data()[cell]).is_some_and(|above| above > STOREY_M),

@@ -72,19 +72,30 @@ fn is_confirmed(level: &Grid<f32>, regions: &Regions, region: usize, depth_m: f3
     if spread_m > RIM_SHARE * (middle_m - own) {
         return true;
     }
-    let cells = regions.cells(region);
-    let middle = cells[cells.len() / 2] as usize;
-    let (column, row) = (middle % level.width(), middle / level.width());
-    let (reach, spacing) = (steps(REACH_M), steps(SPACING_M));
     let (mut count, mut agree) = (0_u32, 0_u32);
-    for y in (row.saturating_sub(reach)..(row + reach + 1).min(level.height())).step_by(spacing) {
-        for x in (column.saturating_sub(reach)..(column + reach + 1).min(level.width())).step_by(spacing) {
-            let height = level[(x, y)];
-            if !height.is_nan() && !regions.holds(region, (y * level.width() + x) as u32) {
-                count += 1;
-                agree += u32::from((height - own).abs() <= depth_m);
-            }
-        }
+    for height in heights_around(level, regions, region, cell_m) {
+        count += 1;
+        agree += u32::from((height - own).abs() <= depth_m);
     }
     f64::from(agree) >= CONFIRMED_SHARE * f64::from(count)
+}
+
+/// Returns the known heights of some cells around a region.
+pub(crate) fn heights_around(
+    heights: &Grid<f32>,
+    regions: &Regions,
+    region: usize,
+    cell_m: f64,
+) -> impl Iterator<Item = f32> {
+    let steps = |metres: f64| ((metres / cell_m).round() as usize).max(1);
+    let cells = regions.cells(region);
+    let middle = cells[cells.len() / 2] as usize;
+    let (width, height) = (heights.width(), heights.height());
+    let (column, row) = (middle % width, middle / width);
+    let (reach, spacing) = (steps(REACH_M), steps(SPACING_M));
+    let rows = (row.saturating_sub(reach)..(row + reach + 1).min(height)).step_by(spacing);
+    let columns = (column.saturating_sub(reach)..(column + reach + 1).min(width)).step_by(spacing);
+    let places = rows.flat_map(move |y| columns.clone().map(move |x| y * width + x));
+    let others = places.filter(move |at| !regions.holds(region, *at as u32));
+    others.map(|at| heights.data()[at]).filter(|height| !height.is_nan())
 }

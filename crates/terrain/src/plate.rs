@@ -1,18 +1,20 @@
 //! A thin plate under tension through known heights that are uncertain: it goes on with the slope
 //! of the ground where a membrane would sag.
 //!
-//! The plate minimises `∫ |D²z|² + |∇z|² / T² dA + ∫ (κ/σ)² (z − s)² dA`, the last over known
+//! The plate minimises `∫ |D²z|² + |∇(z − p)|² / T² dA + ∫ (κ/σ)² (z − s)² dA`, the last over known
 //! heights s with the noise σ. κ is a usual curvature of the ground, and T the length beyond which
-//! the tension straightens the plate. It is solved from coarse to fine cells by over-relaxation.
-//! Terms that would reach beyond the raster are left out, so a slope goes on up to the border.
+//! the tension draws the plate to the slope of p, the plane through all heights. It is solved from
+//! coarse to fine cells by over-relaxation. Terms that would reach beyond the raster are left out,
+//! so a slope goes on up to the border.
 
 use std::ops::Range;
 
 use raster::Grid;
 
-use crate::coarse::{weighted_blocks, widened};
+use crate::coarse::{difference, weighted_blocks, widened};
 use crate::membrane::{completed, filled, halved};
 use crate::runs::{Run, runs};
+use crate::trend::fitted;
 
 /// Sweeps over the cells of each level. The coarser level has done the rest.
 const SWEEPS: usize = 40;
@@ -24,7 +26,7 @@ const MARGIN: usize = 4;
 /// change the errors of simulated towns by a tenth.
 pub(crate) const CURVATURE: f64 = 0.01;
 /// Length of the tension, metres: half of the width of a large building. Wider gaps are too wide to
-/// extrapolate a slope into.
+/// extrapolate a slope into that is not the general one.
 const TENSION_M: f64 = 40.0;
 /// Distance over which the bending of a cell depends on others, cells.
 const REACH: usize = 2;
@@ -39,7 +41,26 @@ pub(crate) fn plate(known: &Grid<f32>, cell_m: f64, noise_m: f64) -> Grid<f32> {
     }
     let counts = known.map(|h| if h.is_nan() { 0.0 } else { 1.0 });
     let weight = (cell_m * CURVATURE / noise_m).powi(2);
-    solved(known, &counts, cell_m, weight as f32)
+    // The tension is that of a membrane over this plane, or wide gaps on a slope would go flat.
+    let plane = plane(known);
+    let mut level = difference(known, &plane);
+    level = solved(&level, &counts, cell_m, weight as f32);
+    level.data_mut().iter_mut().zip(plane.data()).for_each(|(height, plane)| *height += plane);
+    level
+}
+
+/// Returns the plane through known heights by least squares.
+fn plane(known: &Grid<f32>) -> Grid<f32> {
+    let width = known.width();
+    let cells = || known.data().iter().enumerate().filter(|(_, h)| !h.is_nan());
+    let base = cells().next().map_or(0.0, |(_, h)| f64::from(*h));
+    let points = cells().map(|(at, h)| ([(at % width) as f64, (at / width) as f64, f64::from(*h)], 1.0));
+    let [level, along, across] = fitted(points, base);
+    let mut plane = known.clone();
+    for (at, height) in plane.data_mut().iter_mut().enumerate() {
+        *height = (base + level + along * (at % width) as f64 + across * (at / width) as f64) as f32;
+    }
+    plane
 }
 
 /// Returns the plate through heights with the weights (κ/σ)² per square metre, 1/m⁴. NaN cells have
@@ -246,6 +267,14 @@ mod tests {
         let known = with_gap(&plane, |x, y| x > 100 && y < 30);
         let (by_plate, by_membrane) = (worst(&plate(&known, 1.0, 0.01), &plane), worst(&filled(&known), &plane));
         assert!(by_plate < 0.5 * by_membrane, "{by_plate}, {by_membrane}");
+    }
+
+    #[test]
+    fn a_slope_goes_on_over_a_void_that_is_wider_than_the_tension() {
+        let slope = surface(240, 160, |x, y| 0.2 * x + 0.1 * y + 0.5 * (y / 8.0).sin());
+        let known = with_gap(&slope, |x, _| x > 60);
+        let error = worst(&plate(&known, 1.0, 0.1), &slope);
+        assert!(error < 4.0, "{error}");
     }
 
     #[test]

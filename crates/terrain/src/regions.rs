@@ -121,9 +121,9 @@ impl Regions {
         self.cells(region).iter().flat_map(beside).filter(move |&cell| !self.holds(region, cell))
     }
 
-    /// Heights by which the surface drops along the border of a region, metres. Empty for a region
-    /// whose whole border lies at voids or at the border of the raster.
-    pub(crate) fn drops_m(&self, region: usize, surface: &Grid<f32>, cell_m: f64) -> Vec<f32> {
+    /// Heights by which the surface drops along the border of a region, metres, each with its cell
+    /// of the region. Empty for a region whose whole border lies at voids or at that of the raster.
+    pub(crate) fn drops_m(&self, region: usize, surface: &Grid<f32>, cell_m: f64) -> Vec<(u32, f32)> {
         let steps = |metres: f64| ((metres / cell_m).round() as i64).max(1);
         let (outside, gap) = (steps(OUTSIDE_M), steps(GAP_M));
         let (inside, further) = (steps(INSIDE_M), steps(FURTHER_M));
@@ -160,7 +160,7 @@ impl Regions {
                 let is_one =
                     within.max(beyond) <= 2.0 * slope + 1.0 && slope <= STEEPEST * further as f32 * cell_m as f32;
                 let on_slope = if is_one { slope.max(0.0) * (inside + outside) as f32 / further as f32 } else { 0.0 };
-                drops.push(drop - on_slope);
+                drops.push((cell, drop - on_slope));
             }
         }
         drops

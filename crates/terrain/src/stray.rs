@@ -83,7 +83,7 @@ fn steepest(ground: &Grid<f32>, cell_m: f64) -> f32 {
 }
 
 /// Returns the share of voids around a part.
-fn void_share(parts: &Regions, part: usize, surface: &Grid<f32>) -> f64 {
+pub(crate) fn void_share(parts: &Regions, part: usize, surface: &Grid<f32>) -> f64 {
     let is_void = parts.around(part, SURROUNDINGS).map(|cell| surface.data()[cell as usize].is_nan());
     let (voids, cells) = is_void.fold((0, 0), |(voids, cells), is| (voids + usize::from(is), cells + 1));
     voids as f64 / cells.max(1) as f64

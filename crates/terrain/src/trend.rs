@@ -4,7 +4,7 @@
 use raster::Grid;
 use rayon::prelude::*;
 
-use crate::coarse::at_cell;
+use crate::coarse::{at_cell, difference};
 use crate::regions::quantile;
 
 /// Side of the blocks that the planes are fitted to, metres.
@@ -13,6 +13,22 @@ const BLOCK_M: f64 = 10.0;
 const ROUNDS: usize = 6;
 /// Height above a plane at which the weight of a block has halved, metres.
 const HALF_WEIGHT_M: f64 = 1.0;
+/// Half-widths of the planes of a robust trend, metres: from a city block down to the blocks next to
+/// one. Wide planes lie on the ground where narrow ones would lie on a roof, and narrow ones lie on
+/// hilltops.
+const ROBUST_HALF_WIDTHS_M: [f64; 4] = [50.0, 30.0, 20.0, 10.0];
+/// Height above such a plane at which the weight of a block has halved, as a share of the
+/// half-width of the plane: a metre within 20 m. Ground that bends leaves wider planes by more.
+const ROBUST_HALF_WEIGHT: f64 = 0.05;
+/// How much farther below such a plane a block counts as one above it: roofs and crowns stand above
+/// the ground, and only wrong matches lie below it.
+const BELOW: f64 = 3.0;
+/// Weight of the wider planes in a narrower one, blocks. They decide where hardly a block lies near
+/// them.
+const WIDER_BLOCKS: f64 = 0.5;
+
+/// Columns, rows and metres to a block, and the share of its cells that have heights.
+type Point = ([f64; 3], f64);
 
 /// What a plane follows.
 pub(crate) struct TrendConfig {
@@ -43,6 +59,47 @@ pub(crate) fn trend(surface: &Grid<f32>, cell_m: f64, config: &TrendConfig) -> G
     out
 }
 
+/// Returns the trend of a ground in which objects are left that may fill the surroundings of a
+/// place: planes from wide to narrow surroundings, each of which turns away from what lies off the
+/// wider ones.
+pub(crate) fn robust_trend(ground: &Grid<f32>, cell_m: f64) -> Grid<f32> {
+    let widest = TrendConfig { half_width_m: ROBUST_HALF_WIDTHS_M[0], quantile: 0.5, is_lower: false };
+    let side = ((BLOCK_M / cell_m).round() as usize).max(1);
+    let mut out = trend(ground, cell_m, &widest);
+    for half_width_m in ROBUST_HALF_WIDTHS_M {
+        let radius = (half_width_m / (cell_m * side as f64)).round().max(1.0) as usize;
+        let (blocks, shares) = block_quantiles(&difference(ground, &out), side, 0.5);
+        let mut steps = blocks.clone();
+        let width = steps.width();
+        steps.data_mut().par_iter_mut().enumerate().for_each(|(at, step)| {
+            let points = points_around((&blocks, &shares), (at % width, at / width), radius);
+            *step = robust_step(&points, radius as f64, ROBUST_HALF_WEIGHT * half_width_m);
+        });
+        let width = out.width();
+        out.data_mut().par_iter_mut().enumerate().for_each(|(at, height)| {
+            *height += at_cell(&steps, side, at % width, at / width);
+        });
+    }
+    out
+}
+
+/// Returns how far a plane through points above wider planes lies above those, in its middle.
+fn robust_step(points: &[Point], radius: f64, half_weight_m: f64) -> f32 {
+    // As spread as the blocks are.
+    let far = radius * (2.0_f64 / 3.0).sqrt();
+    let wider = [(far, 0.0), (-far, 0.0), (0.0, far), (0.0, -far)].map(|(x, y)| ([x, y, 0.0], 0.25 * WIDER_BLOCKS));
+    let mut plane = [0.0; 3];
+    for _ in 0..ROUNDS {
+        let weight = |([x, y, z], share): Point| {
+            let above = z - (plane[0] + plane[1] * x + plane[2] * y);
+            let off = if above > 0.0 { above } else { above / BELOW };
+            share / (1.0 + (off / half_weight_m).powi(4))
+        };
+        plane = fitted(points.iter().map(|point| (point.0, weight(*point))).chain(wider), 0.0);
+    }
+    plane[0] as f32
+}
+
 /// Returns a quantile of the heights of blocks of `side × side` cells, and the share of their cells
 /// that have heights.
 fn block_quantiles(surface: &Grid<f32>, side: usize, share: f64) -> (Grid<f32>, Grid<f32>) {
@@ -66,12 +123,26 @@ fn block_quantiles(surface: &Grid<f32>, side: usize, share: f64) -> (Grid<f32>, 
 
 /// Fits a plane around a block and returns its height there, NaN without blocks to fit it to. A
 /// block counts by the share of its cells that have heights.
-fn plane_at(
+fn plane_at(blocks: (&Grid<f32>, &Grid<f32>), place: (usize, usize), radius: usize, is_lower: bool) -> f32 {
+    let points = points_around(blocks, place, radius);
+    let Some(base) = points.first().map(|(place, _)| place[2]) else { return f32::NAN };
+    let mut plane = [0.0; 3];
+    for round in 0..if is_lower { ROUNDS } else { 1 } {
+        let weight = |([x, y, z], share): Point| {
+            let above = z - base - (plane[0] + plane[1] * x + plane[2] * y);
+            if round == 0 || above <= 0.0 { share } else { share / (1.0 + (above / HALF_WEIGHT_M).powi(2)) }
+        };
+        plane = fitted(points.iter().map(|point| (point.0, weight(*point))), base);
+    }
+    (base + plane[0]) as f32
+}
+
+/// Returns the blocks around a block that have heights.
+fn points_around(
     (blocks, shares): (&Grid<f32>, &Grid<f32>),
     (column, row): (usize, usize),
     radius: usize,
-    is_lower: bool,
-) -> f32 {
+) -> Vec<Point> {
     let mut points = Vec::with_capacity((2 * radius + 1).pow(2));
     for y in row.saturating_sub(radius)..(row + radius + 1).min(blocks.height()) {
         for x in column.saturating_sub(radius)..(column + radius + 1).min(blocks.width()) {
@@ -81,21 +152,12 @@ fn plane_at(
             }
         }
     }
-    let Some(base) = points.first().map(|(place, _)| place[2]) else { return f32::NAN };
-    let mut plane = [0.0; 3];
-    for round in 0..if is_lower { ROUNDS } else { 1 } {
-        let weight = |([x, y, z], share): ([f64; 3], f64)| {
-            let above = z - base - (plane[0] + plane[1] * x + plane[2] * y);
-            if round == 0 || above <= 0.0 { share } else { share / (1.0 + (above / HALF_WEIGHT_M).powi(2)) }
-        };
-        plane = fitted(points.iter().map(|point| (point.0, weight(*point))), base);
-    }
-    (base + plane[0]) as f32
+    points
 }
 
 /// Fits a plane `a + b·x + c·y` to weighted points by least squares. A little damping of the slopes
 /// decides where the points lie on a line.
-fn fitted(points: impl Iterator<Item = ([f64; 3], f64)>, base: f64) -> [f64; 3] {
+pub(crate) fn fitted(points: impl Iterator<Item = Point>, base: f64) -> [f64; 3] {
     let (mut n, mut sx, mut sy, mut sz) = (0.0, 0.0, 0.0, 0.0);
     let (mut xx, mut xy, mut yy, mut xz, mut yz) = (0.0, 0.0, 0.0, 0.0, 0.0);
     for ([x, y, z], weight) in points {
@@ -130,5 +192,18 @@ mod tests {
         let found = trend(&plane, 1.0, &config);
         let worst = found.data().iter().zip(plane.data()).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
         assert!(worst < 0.7, "{worst}");
+    }
+
+    /// A hall of 60 m on a slope of 40 %, whose roof is flush with the ground uphill and stands
+    /// 24 m above it downhill.
+    #[test]
+    fn a_robust_trend_goes_on_under_a_flat_roof_that_fills_the_narrow_surroundings() {
+        let slope = |column: usize| 0.4 * column as f32;
+        let is_roof = |column: usize, row: usize| (70..130).contains(&column) && (70..130).contains(&row);
+        let height = |column: usize, row: usize| slope(if is_roof(column, row) { 130 } else { column });
+        let cells = (0..40_000).map(|at| height(at % 200, at / 200));
+        let found = robust_trend(&Grid::from_vec(200, 200, cells.collect()).unwrap(), 1.0);
+        let worst = (0..40_000).map(|at| (found.data()[at] - slope(at % 200)).abs()).fold(0.0, f32::max);
+        assert!(worst < 3.0, "{worst}");
     }
 }

@@ -274,3 +274,20 @@ fn wrong_matches_and_roofs_between_voids_do_not_bend_a_slope() {
     let roofs = share(&found, GROUND, |x, y| x > 30.0 && is_roof(x, y) && !is_street(x, y));
     assert!(roofs < 0.02, "{roofs}");
 }
+
+/// Flat halls on a slope as images show them: flush with the ground uphill, and carried on into it
+/// by the matching.
+#[test]
+fn flat_roofs_that_are_flush_with_a_slope_and_sink_into_it_are_no_ground() {
+    let truth = surface(240, |x, y| 0.4 * x + 0.05 * y);
+    let hall = |x: f32, y: f32| ((y - 20.0).rem_euclid(75.0) < 45.0).then_some((x - 20.0).rem_euclid(80.0));
+    let cells = surface(240, |x, y| {
+        let ground = 0.4 * x + 0.05 * y + noise(x, y, 0.1);
+        // Roofs are level with the ground 45 m uphill of their lower wall, and go on for 6 m.
+        hall(x, y).filter(|along| *along < 51.0).map_or(ground, |along| ground + 0.4 * (45.0 - along))
+    });
+    let is_void = |x: f32, y: f32| hall(x, y).is_none() && (x * 5.0 + y * 3.0) % 61.0 < 6.0;
+    let unseen = surface(240, |x, y| f32::from(is_void(x, y))).map(|is| *is > 0.0);
+    let found = bare_ground_of_observed(&cells, Some(&unseen), CELL_M, &GroundConfig::default(), &Silent).unwrap();
+    assert!(rmse(&found, &truth) < 1.3, "{}", rmse(&found, &truth));
+}
