@@ -173,20 +173,24 @@ def test_heights_of_views_in_memory(rpc: skysweep.Rpc) -> None:
 
 def test_the_surface_of_views_in_memory_is_that_of_a_run(tmp_path: Path) -> None:
     search = (170.0, 280.0)
-    skysweep.dsm(VIEWS, tmp_path, pointing=False, height_range_m=search, preset="fast", gsd_m=1.0)
-    of_run = {name: skysweep.read_raster(tmp_path / "dsm" / f"{name}.tif") for name in ["dsm", "source", "views"]}
-    run = of_run["dsm"]
-    views = [(skysweep.read_raster(path).values, skysweep.Rpc(path)) for path in VIEWS]
+    skysweep.dsm(VIEWS, tmp_path, height_range_m=search, preset="fast", gsd_m=1.0)
+    run, source, seen = (skysweep.read_raster(tmp_path / "dsm" / name) for name in ["dsm.tif", "source.tif", "views.tif"])
+    # No data is 0 in both.
+    source, seen = (np.nan_to_num(raster.values) for raster in [source, seen])
+    views = [(skysweep.read_raster(path).values, skysweep.Rpc.from_run(tmp_path, path)) for path in VIEWS]
     sweep = skysweep.HeightSweep(views, search, preset="fast")
     found = sweep.surface(run.bounds, 1.0, run.epsg)
     assert found.heights.geotransform == run.geotransform and found.heights.epsg == run.epsg
     assert found.heights.vertical == run.vertical
-    # A run knows from its tie points how far the cameras are off, which changes a few weak cells.
-    assert np.mean(found.source == of_run["source"].values) > 0.99
-    observed = (found.source == 1) & (of_run["source"].values == 1)
-    assert np.array_equal(found.views[observed], of_run["views"].values[observed])
-    assert np.abs(found.heights.values - run.values)[observed].max() < 0.001
-    assert (found.sigma_m[observed] > 0.0).all() and ((0.0 <= found.probability) & (found.probability <= 1.0)).all()
+    # A run takes the middle of its tie points for its geometry, so its hypotheses lie a little elsewhere.
+    assert np.mean(found.source == source) > 0.97
+    observed = (found.source == 1) & (source == 1)
+    assert np.mean(found.views[observed] == seen[observed]) > 0.97
+    assert np.quantile(np.abs(found.heights.values - run.values)[observed], 0.9) < 0.1
+    known = np.isfinite(found.heights.values)
+    assert np.array_equal(known, np.isfinite(found.sigma_m)) and np.array_equal(known, np.isfinite(found.probability))
+    assert (found.sigma_m[known] > 0.0).all()
+    assert ((0.0 <= found.probability[known]) & (found.probability[known] <= 1.0)).all()
     with pytest.raises(skysweep.InputError, match="0 × 0 cells"):
         sweep.surface((0.0, 0.0, 0.0, 0.0), 1.0, 32631)
     with pytest.raises(skysweep.CrsError):

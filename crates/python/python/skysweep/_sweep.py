@@ -43,7 +43,7 @@ class ViewSurface(NamedTuple):
     heights: Raster
     #: Standard deviations, metres, f32; NaN where there is no height.
     sigma_m: NDArray[np.float32]
-    #: Probability that the height is right, 0 to 1, f32; 0 where there is no height.
+    #: Probability that the height is right, 0 to 1, f32; NaN where there is no height.
     probability: NDArray[np.float32]
     #: Number of views that observed the height, u8; 0 where it was filled.
     views: NDArray[np.uint8]
@@ -123,7 +123,7 @@ class HeightSweep:
     ) -> ViewSurface:
         """Computes the surface of the views on a map: a DSM without files.
 
-        It is that of a run whose pointing is not corrected and whose heights to search are given.
+        It is that of a run with these cameras and these heights to search, up to where its hypotheses lie.
 
         Args:
             bounds: Left, bottom, right and top of the surface on the map. The grid is snapped to whole cells.

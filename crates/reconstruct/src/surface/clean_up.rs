@@ -9,7 +9,7 @@ use sweep::fusion::{
     CellSource, FillConfig, FillRule, FusedSurface, GridSight, KnownVoids, TrendConfig, Trust, TrustConfig, calibrate,
     fill_voids, ground_trend, occlusion_bounds, remove_speckle, surroundings,
 };
-use terrain::{GroundConfig, bare_ground_of_observed, goes_through_roofs};
+use terrain::{GroundConfig, bare_ground_by_openings, goes_through_roofs};
 
 use crate::surface::fill::Fill;
 
@@ -148,7 +148,7 @@ fn ground_under(height_m: &Grid<f32>, trusted: &Grid<bool>, trend: &Grid<f32>, g
     let doubted = seen.data_mut().iter_mut().zip(trusted.data()).filter(|(_, is_trusted)| !**is_trusted);
     doubted.for_each(|(height, _)| *height = f32::NAN);
     let unobserved = seen.map(|h| h.is_nan());
-    let found = bare_ground_of_observed(&seen, Some(&unobserved), gsd_m, &GroundConfig::default(), &Silent);
+    let found = bare_ground_by_openings(&seen, &unobserved, gsd_m, &GroundConfig::default(), &Silent);
     let mut ground_m = found.expect("the cells and the default settings are valid, and nothing cancels").heights;
     let only_roofs = goes_through_roofs(&ground_m, height_m, trend, gsd_m);
     let cells = ground_m.data_mut().iter_mut().zip(trend.data()).zip(only_roofs.data());
