@@ -191,8 +191,8 @@ def test_the_surface_of_views_in_memory_is_that_of_a_run(tmp_path: Path) -> None
     assert np.array_equal(known, np.isfinite(found.sigma_m)) and np.array_equal(known, np.isfinite(found.probability))
     assert (found.sigma_m[known] > 0.0).all()
     assert ((0.0 <= found.probability[known]) & (found.probability[known] <= 1.0)).all()
-    with pytest.raises(skysweep.InputError, match="0 × 0 cells"):
-        sweep.surface((0.0, 0.0, 0.0, 0.0), 1.0, 32631)
+    with pytest.raises(skysweep.InputError, match="grid of -9 × -9 cells"):
+        sweep.surface((9.0, 9.0, 0.0, 0.0), 1.0, 32631)
     with pytest.raises(skysweep.CrsError):
         sweep.surface(run.bounds, 1.0, 999)
     with pytest.raises(skysweep.InputError, match='the fill is "some"'):
