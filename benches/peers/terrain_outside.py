@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
 """Measures skysweep dtm on laser scans and on scenes of a simulator that shares no code with it.
 
-    benches/peers/terrain_outside.py [--skysweep PROGRAM] [--before PROGRAM] [--work FOLDER] [--seeds 9856 ...]
+    benches/peers/terrain_outside.py [--skysweep PROGRAM] [--before PROGRAM TEXT] [--picture PNG] [--work FOLDER] [--seeds 9856 ...]
 
 The ISPRS filter test, LiDAR of Delft, JAX_214 and JAX_068, the images of JAX_068, and surfaces that `skysweep dsm` makes of
 the scenes of ../shared/tools/scenes.py, with images of 448 pixels on a side. A scene lies in FOLDER/scenes/rSEED (images,
-truth, run/), and is made where it is missing. `--before` is a second program whose figures stand beside; the ground of the
-first scene by both goes to docs/figures/terrain_noise.png. Writes benches/results/terrain_outside.json and
+truth, run/), and is made where it is missing. `--before` is a second program whose figures stand beside, and what it is;
+with `--picture` the ground of the first scene by both is drawn. Writes benches/results/terrain_outside.json and
 terrain_outside.md. Needs Python with numpy, scipy and rasterio.
 """
 import argparse
@@ -125,19 +125,21 @@ def measured(program, options):
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--skysweep", default=str(ROOT / "target/release/skysweep"))
-    parser.add_argument("--before")
+    parser.add_argument("--before", nargs=2, metavar=("PROGRAM", "TEXT"))
+    parser.add_argument("--picture", type=pathlib.Path)
     parser.add_argument("--work", type=pathlib.Path, default=ROOT / "target/terrain-outside")
     parser.add_argument("--seeds", type=int, nargs="*", default=BLIND)
     options = parser.parse_args()
     place = ROOT / "benches/results"
     report = {"skysweep": measured(options.skysweep, options)}
     if options.before:
-        report["before"] = measured(options.before, options)
-        picture([options.before, options.skysweep], options, ROOT / "docs/figures/terrain_noise.png")
+        report["before"] = measured(options.before[0], options)
+        if options.picture:
+            picture([options.before[0], options.skysweep], options, options.picture)
     names = list(report)
     lines = ["# Terrain on other places", "", "Made by `benches/peers/terrain_outside.py`. Lower is better.", ""]
     if options.before:
-        lines += ["`before`: a build that kept the noise of observed ground.", ""]
+        lines += [f"`before`: {options.before[1]}.", ""]
     lines += ["| measure | " + " | ".join(names) + " |", "|---" * (len(names) + 1) + "|"]
     for measure in report["skysweep"]:
         lines.append(f"| {measure} | " + " | ".join(f"{report[name][measure]:.2f}" for name in names) + " |")
