@@ -13,9 +13,9 @@ const BLOCK_M: f64 = 10.0;
 const ROUNDS: usize = 6;
 /// Height above a plane at which the weight of a block has halved, metres.
 const HALF_WEIGHT_M: f64 = 1.0;
-/// Half-widths of the planes of a robust trend, metres: from a city block down to the blocks next to
-/// one. Wide planes lie on the ground where narrow ones would lie on a roof, and narrow ones lie on
-/// hilltops.
+/// Half-widths of the planes of a robust trend, metres: from a city block down to the blocks next
+/// to one. Wide planes lie on the ground where narrow ones would lie on a roof, and narrow ones lie
+/// on hilltops.
 const ROBUST_HALF_WIDTHS_M: [f64; 4] = [50.0, 30.0, 20.0, 10.0];
 /// Height above such a plane at which the weight of a block has halved, as a share of the
 /// half-width of the plane: a metre within 20 m. Ground that bends leaves wider planes by more.
