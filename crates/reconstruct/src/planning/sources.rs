@@ -59,8 +59,8 @@ impl<'a> SourceCandidates<'a> {
         Self { by_merit, worth, outlines: &geometry.outlines, usual: tuning.sources }
     }
 
-    /// Keeps the best `VIEWS` views over each place of the ground, and at most twice as many in all.
-    /// `parts` are the parts of the ground that the views show.
+    /// Keeps the best `VIEWS` views over each place of the ground, and at most twice as many in
+    /// all. `parts` are the parts of the ground that the views show.
     pub fn best_views(&self, ground: &Polygon<f64>, parts: Parts) -> Parts {
         self.best(VIEWS, ground, parts)
     }
