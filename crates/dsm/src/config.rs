@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use crs::VerticalDatum;
 use io::areas::AreaName;
 use io::raster::BandChoice;
-use reconstruct::{Fill, HeightRange, ImagePair, MapBounds, Preset};
+use reconstruct::{Fill, HeightRange, ImagePair, MapBounds, Preset, SurfaceOptions};
 use serde::{Deserialize, Serialize};
 
 use crate::adapters::positions_from_one;
@@ -16,8 +16,6 @@ use crate::products::ProductKind;
 const SIDE_MIN: usize = 64;
 /// Most images of a folder that an error names.
 const NAMED_IMAGES: usize = 8;
-/// Side of the output tiles where none is given, cells.
-const TILE_DEFAULT: usize = 1024;
 
 /// Polygons of a layer.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -162,7 +160,7 @@ const fn yes() -> bool {
 }
 
 const fn default_tile() -> usize {
-    TILE_DEFAULT
+    SurfaceOptions::USUAL_TILE
 }
 
 impl DsmConfig {
@@ -199,7 +197,7 @@ impl DsmConfig {
             threads: None,
             memory_mb: None,
             chunk: None,
-            tile: TILE_DEFAULT,
+            tile: SurfaceOptions::USUAL_TILE,
             overwrite: false,
         }
     }

@@ -1,10 +1,10 @@
 //! The errors of the DSM job.
 
-use reconstruct::{CELLS_MAX, HeightRange, MapBounds, ReconstructError};
 use std::fmt;
 use std::path::PathBuf;
 
 use numeric::{Failure, Kind, failures};
+use reconstruct::{CELLS_MAX, HeightRange, MapBounds, ReconstructError};
 use report::plain_number;
 use sweep::SweepError;
 

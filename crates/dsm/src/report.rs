@@ -1,11 +1,11 @@
 //! The report of a run.
 
-use reconstruct::{HeightRange, MapBounds, PairGeometry};
 use std::path::PathBuf;
 
 use camera::{ImageCorrection, ImagePoint};
 use io::stac::SunPosition;
 use numeric::Choice;
+use reconstruct::{HeightRange, MapBounds, PairGeometry};
 use serde::{Deserialize, Serialize};
 use sweep::pointing::{Adjustment, ModelOrder};
 

@@ -42,7 +42,8 @@ pub(crate) fn sweep_views<'py>(
     preset: &str,
     watcher: &Bound<'py, PyAny>,
 ) -> PyResult<Vec<Found<'py>>> {
-    let (views, preset, range) = (images(py, &views)?, preset_named(py, preset)?, HeightRange::from(height_range));
+    let (views, preset, range) =
+        (images(py, &views)?, chosen(py, "preset", preset, Preset::CHOICES)?, HeightRange::from(height_range));
     let found = watched(py, watcher, &[], |progress| Ok(reconstruct::sweep_views(views, range, preset, progress)?))?;
     found.into_iter().map(|heights| arrays(py, heights)).collect()
 }
@@ -61,9 +62,9 @@ pub(crate) fn surface_of_views<'py>(
     fill: &str,
     watcher: &Bound<'py, PyAny>,
 ) -> PyResult<Surface<'py>> {
-    let (views, preset, range) = (images(py, &views)?, preset_named(py, preset)?, HeightRange::from(height_range));
-    let known = Fill::CHOICES.iter().find(|(name, ..)| *name == fill);
-    let (_, fill, _) = *known.ok_or_else(|| unknown(py, "fill", fill, Fill::CHOICES.map(|(name, ..)| name)))?;
+    let (views, preset, range) =
+        (images(py, &views)?, chosen(py, "preset", preset, Preset::CHOICES)?, HeightRange::from(height_range));
+    let fill = chosen(py, "fill", fill, Fill::CHOICES)?;
     let (grid, rasters) = watched(py, watcher, &[], |progress| {
         let grid = DsmGrid::over(MapBounds::from(bounds), epsg, cell_m)?;
         let (rasters, _) = reconstruct::surface_of_views(views, &grid, range, preset, fill, progress)?;
@@ -77,17 +78,18 @@ pub(crate) fn surface_of_views<'py>(
     Ok((grid.geotransform.0, single(heights)?, single(sigma_m)?, single(confidence)?, small(views)?, small(source)?))
 }
 
-/// Returns the preset of a name.
-fn preset_named(py: Python<'_>, preset: &str) -> PyResult<Preset> {
-    let known = Preset::CHOICES.iter().find(|(name, ..)| *name == preset);
-    known
-        .map(|(_, preset, _)| *preset)
-        .ok_or_else(|| unknown(py, "preset", preset, Preset::CHOICES.map(|(name, ..)| name)))
-}
-
-/// Says which values a setting can have.
-fn unknown<const N: usize>(py: Python<'_>, setting: &str, found: &str, names: [&str; N]) -> PyErr {
-    raise(py, &Fault::setting(format!("the {setting} is {found:?}, expected one of {}", names.join(", "))))
+/// Returns the value of a setting with a name.
+fn chosen<T: Copy, const N: usize>(
+    py: Python<'_>,
+    setting: &str,
+    found: &str,
+    choices: [(&str, T, &str); N],
+) -> PyResult<T> {
+    let known = choices.iter().find(|(name, ..)| *name == found).map(|(_, value, _)| *value);
+    known.ok_or_else(|| {
+        let names = choices.map(|(name, ..)| name).join(", ");
+        raise(py, &Fault::setting(format!("the {setting} is {found:?}, expected one of {names}")))
+    })
 }
 
 /// Takes the views out of Python's arrays.

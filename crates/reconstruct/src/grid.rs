@@ -30,8 +30,8 @@ impl DsmGrid {
     /// [`snapped`].
     pub fn over(bounds: MapBounds, epsg: u32, gsd_m: f64) -> Result<Self, ReconstructError> {
         let projection = MapProjection::from_epsg(epsg)?;
-        let middle = (0.5 * (bounds.x_min + bounds.x_max), 0.5 * (bounds.y_min + bounds.y_max));
-        let (_, lat_deg) = projection.lonlat_from_map(middle.0, middle.1)?;
+        let (x, y) = bounds.middle();
+        let (_, lat_deg) = projection.lonlat_from_map(x, y)?;
         let (geotransform, size) = snapped(bounds, cell_size(&projection, gsd_m, lat_deg))?;
         Ok(Self { epsg, geotransform, size, gsd_m })
     }
@@ -57,12 +57,6 @@ impl DsmGrid {
         let (x_min, y_max) = self.geotransform.map_from_cell(-0.5, -0.5);
         let (x_max, y_min) = self.geotransform.map_from_cell(self.size.0 as f64 - 0.5, self.size.1 as f64 - 0.5);
         MapBounds { x_min, y_min, x_max, y_max }
-    }
-
-    /// Returns the middle of the rectangle that the cells cover.
-    pub fn middle(&self) -> (f64, f64) {
-        let MapBounds { x_min, y_min, x_max, y_max } = self.bounds();
-        (0.5 * (x_min + x_max), 0.5 * (y_min + y_max))
     }
 
     /// Makes the projection of the CRS.

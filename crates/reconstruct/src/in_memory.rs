@@ -12,7 +12,7 @@ use sweep::{HeightMap, SweepView};
 use crate::error::ReconstructError;
 use crate::grid::DsmGrid;
 use crate::planning::levels::{choose_levels, height_step_m, smallest_sides};
-use crate::planning::sources::{Parts, SourceCandidates, widest_parallax};
+use crate::planning::sources::{SourceCandidates, widest_parallax};
 use crate::planning::view_geometry::{ImageGeometry, ViewGeometry};
 use crate::scene_sweep::{SceneSweep, sweep_scene};
 use crate::surface::fill::Fill;
@@ -20,9 +20,6 @@ use crate::surface::make::{SurfaceCounts, SurfaceInput, SurfaceOptions, make_sur
 use crate::surface::rasters::SurfaceRasters;
 use crate::tuning::Preset;
 use crate::values::{HeightRange, ImagePair};
-
-/// Side of the tiles that are fused at a time, cells.
-const TILE: usize = 1024;
 
 /// An image in memory with its camera.
 #[derive(Debug, Clone)]
@@ -59,7 +56,6 @@ pub fn sweep_views(
     progress: &dyn Progress,
 ) -> Result<Vec<ViewHeights>, ReconstructError> {
     let MemoryScene { views, sweep, .. } = MemoryScene::of(images, range, preset)?;
-    progress.begin("sweeping heights", views.len() * sweep.maps_per_view());
     let maps = sweep_scene(&views, &sweep, progress)?.maps;
     confirmed(&views, sweep, maps)
 }
@@ -95,10 +91,9 @@ pub fn surface_of_views(
 ) -> Result<(SurfaceRasters, SurfaceCounts), ReconstructError> {
     let MemoryScene { views, mut sweep, useful, pixel_m } = MemoryScene::of(images, range, preset)?;
     sweep.lattices_px = preset.tuning().lattices_px();
-    progress.begin("sweeping heights", views.len() * sweep.maps_per_view());
     let heights = sweep_scene(&views, &sweep, progress)?;
     let input = SurfaceInput {
-        options: SurfaceOptions { fill, height_range: Some(range), tile: TILE },
+        options: SurfaceOptions { fill, height_range: Some(range), tile: SurfaceOptions::USUAL_TILE },
         sweep: &sweep,
         useful: &useful,
         grid,
@@ -108,7 +103,6 @@ pub fn surface_of_views(
         core: grid.whole(),
         mask: None,
     };
-    progress.begin("fusing", 1 + sweep.sources.iter().filter(|sources| !sources.is_empty()).count());
     make_surface(input, views, heights, progress)
 }
 
@@ -137,10 +131,8 @@ impl MemoryScene {
         let geometry = ViewGeometry::at(&described, range.middle_m())?;
         let useful = geometry.useful_pairs()?;
         let unmatched = useful.iter().map(|pair| (pair.ordered(), 0)).collect();
-        let parts: Parts = geometry.outlines.iter().cloned().map(Some).collect();
-        let sources = SourceCandidates::of(&geometry, &unmatched, None, &tuning).choose(&parts);
-        let pixels_m = images.iter().enumerate().filter_map(|(i, image)| geometry.ground_sampling_m(&image.camera, i));
-        let pixel_m = pixels_m.fold(0.0, f64::max);
+        let sources = SourceCandidates::of(&geometry, &unmatched, None, &tuning).choose_everywhere();
+        let pixel_m = geometry.coarsest_sampling_m(images.iter().map(|image| &image.camera));
         let step_m = height_step_m(widest_parallax(&sources, &geometry), &tuning);
         let windows: Vec<Window> = described.iter().map(|image| Window::whole(image.size.0, image.size.1)).collect();
         let levels = choose_levels(range, step_m, &smallest_sides(&windows), &tuning);

@@ -78,7 +78,7 @@ impl SceneSweep {
     }
 
     /// Returns the number of height maps that a view gets.
-    pub fn maps_per_view(&self) -> usize {
+    fn maps_per_view(&self) -> usize {
         self.levels.count() + self.lattices_px.len()
     }
 }
@@ -105,8 +105,8 @@ pub struct LatticeHeights {
     pub maps: Vec<HeightMap>,
 }
 
-/// Sweeps all views from the coarsest level to the finest, and the finest on all lattices. Each
-/// height map of a view is a step of `progress`.
+/// Sweeps all views from the coarsest level to the finest, and the finest on all lattices: a stage
+/// of `progress`, of which each height map of a view is a step.
 ///
 /// # Errors
 /// [`ReconstructError::Sweep`] as [`sweep_level`], [`ReconstructError::Cancelled`] between two
@@ -116,6 +116,7 @@ pub fn sweep_scene(
     sweep: &SceneSweep,
     progress: &dyn Progress,
 ) -> Result<SceneHeights, ReconstructError> {
+    progress.begin("sweeping heights", views.len() * sweep.maps_per_view());
     let SweepLevels { finest, coarsest } = sweep.levels;
     let none = PlacedModel { priors: vec![None; views.len()], findings: PriorFindings::default(), hypotheses: 0 };
     let model = if sweep.priors.iter().any(Option::is_some) {

@@ -205,6 +205,11 @@ impl MapBounds {
         Self { x_min: self.y_min, y_min: self.x_min, x_max: self.y_max, y_max: self.x_max }
     }
 
+    /// Returns the middle of the rectangle.
+    pub fn middle(self) -> (f64, f64) {
+        (0.5 * (self.x_min + self.x_max), 0.5 * (self.y_min + self.y_max))
+    }
+
     /// Returns `[x_min, y_min, x_max, y_max]`.
     pub fn to_array(self) -> [f64; 4] {
         [self.x_min, self.y_min, self.x_max, self.y_max]

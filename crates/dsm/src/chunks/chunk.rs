@@ -134,7 +134,6 @@ fn sweep_chunk(
         sweep.priors = prior.seen_from(&views, plan.pixel_m)?;
         ids = &prior.ids;
     }
-    progress.begin("sweeping heights", views.len() * sweep.maps_per_view());
     let heights = sweep_scene(&views, &sweep, progress)?;
     let (hypotheses, findings) = (heights.hypotheses, heights.findings.clone().named(ids));
     if is_whole {
@@ -154,7 +153,6 @@ fn sweep_chunk(
         core,
         mask: mask.as_ref(),
     };
-    progress.begin("fusing", 1 + work.sources.iter().filter(|s| !s.is_empty()).count());
     let (rasters, counts) = make_surface(input, views, heights, progress)?;
     if is_whole {
         session.lap("fusion");

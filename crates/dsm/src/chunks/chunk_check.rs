@@ -3,11 +3,12 @@
 //! A result may have been computed elsewhere. Heights that are not finite or that the plan never
 //! searched, and counts that are not those of the rasters, are no result.
 
+use reconstruct::{HeightRange, SURROUNDINGS_M, SurfaceCounts};
+
 use crate::chunks::chunk::{ChunkContent, ChunkResult, ChunkSurface};
 use crate::error::DsmError;
 use crate::planning::chunk_plan::{ChunkSweep, ChunkWork};
 use crate::planning::plan::Plan;
-use reconstruct::{HeightRange, SURROUNDINGS_M, SurfaceCounts};
 use sweep::fusion::{FILLED, VOID};
 
 /// Steps of the finest level that an observed height may lie outside the range: hypotheses begin

@@ -5,12 +5,12 @@
 //! result that was written and read back gives the same DSM. The folder is made beside its place
 //! and renamed, so that it is complete under its name.
 
-use reconstruct::{HeightRange, PriorFindings, SurfaceCounts, SurfaceRasters};
 use std::fs;
 use std::path::Path;
 
 use io::npy::NpyData;
 use raster::{Grid, Window};
+use reconstruct::{HeightRange, PriorFindings, SurfaceCounts, SurfaceRasters};
 use serde::{Deserialize, Serialize};
 
 use crate::chunks::chunk::{ChunkContent, ChunkResult, ChunkSurface};

@@ -1,10 +1,10 @@
 //! Last stage of a run: the results of the chunks become the files of the DSM and its report.
 
-use reconstruct::{HeightRange, PriorFindings, ShadowSide, SurfaceCounts, shadow_side};
 use std::path::PathBuf;
 
 use numeric::Progress;
 use raster::Window;
+use reconstruct::{HeightRange, PriorFindings, ShadowSide, SurfaceCounts, shadow_side};
 
 use crate::chunks::chunk::{ChunkContent, ChunkResult, ChunkSurface};
 use crate::error::DsmError;

@@ -1,12 +1,12 @@
 //! A reference elevation model at the cells of a DSM, above the ellipsoid.
 
-use reconstruct::DsmGrid;
 use std::path::Path;
 
 use crs::{HeightConverter, MapProjection, VerticalDatum};
 use eval::{CellMap, bilinear, convert_heights};
 use io::raster::{Dem, ImageSource, read_dem_window};
 use raster::{GeoTransform, Grid, Window, reduce};
+use reconstruct::DsmGrid;
 
 use crate::error::{DsmError, DsmSetting};
 

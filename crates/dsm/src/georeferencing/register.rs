@@ -11,7 +11,6 @@
 //! their own, or shifts that do not converge. The standard error of the shift follows from those of
 //! the parts and is reported.
 
-use reconstruct::{DsmGrid, Fill, HeightRange, Preset};
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -21,6 +20,7 @@ use eval::{MetresFromCells, Registration, Shift, register_surfaces};
 use geodesy::LonLatHeight;
 use numeric::{Muted, Silent, nearest_quantile};
 use raster::{Grid, reduce};
+use reconstruct::{DsmGrid, Fill, HeightRange, Preset};
 
 use crate::chunks::chunk::{ChunkContent, run_chunk};
 use crate::config::DsmConfig;
@@ -486,8 +486,7 @@ fn trial_cell_m(trial: &DsmConfig, pointed: &Pointed) -> Result<f64, DsmError> {
     let offsets = || images.iter().map(|image| image.camera.rpc.height_off).sum::<f64>() / images.len() as f64;
     let height_m = pointed.tie_heights.map_or_else(offsets, HeightRange::middle_m);
     let geometry = SceneImage::geometry(images, height_m)?;
-    let pixels = images.iter().enumerate().filter_map(|(i, image)| geometry.ground_sampling_m(&image.camera, i));
-    let pixel_m = pixels.fold(0.0, f64::max);
+    let pixel_m = geometry.coarsest_sampling_m(images.iter().map(|image| &image.camera));
     let grid = choose_grid(&DsmConfig { gsd_m: Some(pixel_m), ..trial.clone() }, &geometry, pixel_m)?;
     let cells = grid.size.0 as f64 * grid.size.1 as f64;
     Ok(pixel_m * (cells / CELLS_MAX).sqrt().max(1.0))

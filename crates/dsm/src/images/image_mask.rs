@@ -4,7 +4,6 @@
 //! neither 0 nor without data is masked. Polygons on the ground are seen at the mean height of the
 //! image's RPC.
 
-use reconstruct::footprint;
 use std::path::{Path, PathBuf};
 
 use camera::ImagePoint;
@@ -12,6 +11,7 @@ use geodesy::LonLatHeight;
 use io::areas::AreaName;
 use io::raster::ImageSource;
 use raster::{Grid, Window, mark_inside};
+use reconstruct::footprint;
 
 use crate::error::{DsmError, DsmSetting};
 use crate::images::scene_image::SceneImage;

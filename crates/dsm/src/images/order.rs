@@ -4,8 +4,9 @@
 //! that of the content the result has the same bytes in whatever order the images are given.
 //! Messages and reports count the images as they were given.
 
-use reconstruct::ImagePair;
 use std::cmp::Ordering;
+
+use reconstruct::ImagePair;
 
 use crate::config::DsmConfig;
 use crate::images::scene_image::SceneImage;

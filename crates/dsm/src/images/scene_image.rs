@@ -1,11 +1,11 @@
 //! The images of a run with their cameras.
 
-use reconstruct::{ImageGeometry, ReconstructError, ViewGeometry};
 use std::path::PathBuf;
 
 use camera::{ImagePoint, RpcCamera};
 use io::stac::SunPosition;
 use raster::Window;
+use reconstruct::{ImageGeometry, ReconstructError, ViewGeometry};
 use serde::{Deserialize, Serialize};
 
 use crate::error::DsmError;

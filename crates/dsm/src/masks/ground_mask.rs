@@ -1,7 +1,6 @@
 //! Cells of the DSM that get no height: those under a mask, and those outside the area that was
 //! asked for.
 
-use reconstruct::{DsmGrid, GroundMask, MapBounds};
 use std::path::Path;
 
 use crs::MapProjection;
@@ -10,6 +9,7 @@ use geo::{Area, CoordsIter, Rect};
 use io::areas::AreaName;
 use io::raster::ImageSource;
 use raster::{GeoTransform, Grid, Window, mark_inside};
+use reconstruct::{DsmGrid, GroundMask, MapBounds};
 
 use crate::config::DsmConfig;
 use crate::error::{DsmError, DsmSetting, axes_hint, degrees};

@@ -3,10 +3,10 @@
 //! A chunk has a core, which is kept, and a rim of ground around it, as wide as what decides the
 //! content of a cell.
 
-use reconstruct::{DsmGrid, HeightRange, SURROUNDINGS_M};
 use std::collections::HashMap;
 
 use raster::Window;
+use reconstruct::{DsmGrid, HeightRange, SURROUNDINGS_M};
 
 use crate::config::DsmConfig;
 use crate::error::DsmError;

@@ -1,9 +1,9 @@
 //! The heights of a coarse elevation model over the scene.
 
-use reconstruct::{HeightRange, MapBounds, ReconstructError, ViewGeometry, shared_ground};
 use std::path::Path;
 
 use crs::{HeightConverter, MapProjection, VerticalDatum};
+use reconstruct::{HeightRange, MapBounds, ReconstructError, ViewGeometry, shared_ground};
 
 use crate::error::{DsmError, DsmSetting};
 use crate::notes::Notes;

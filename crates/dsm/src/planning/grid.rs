@@ -144,7 +144,7 @@ fn outside_area(epsg: u32, (lon_deg, lat_deg): (f64, f64)) -> Result<Option<Outs
 
 /// Warns of a CRS that is used outside its area of use. A place that cannot be found is no warning.
 fn warn_of_area(grid: &DsmGrid, notes: &mut Notes<'_>) {
-    let (x, y) = grid.middle();
+    let (x, y) = grid.bounds().middle();
     let place = grid.projection().and_then(|projection| projection.lonlat_from_map(x, y));
     if let Ok(Some(area)) = place.and_then(|place| outside_area(grid.epsg, place)) {
         notes.warn(format!("the CRS is used outside its area of use, where it distorts: {}", area.text));
@@ -169,7 +169,7 @@ fn warn_of_scale(grid: &DsmGrid, notes: &mut Notes<'_>) {
 fn scale_of(grid: &DsmGrid) -> Option<f64> {
     let projection = grid.projection().ok()?;
     let metres = projection.metres_per_unit()?;
-    let (x, y) = grid.middle();
+    let (x, y) = grid.bounds().middle();
     let step = grid.bounds().x_max - x;
     let (lon, lat) = projection.lonlat_from_map(x, y).ok()?;
     let (east_lon, east_lat) = projection.lonlat_from_map(x + step, y).ok()?;

@@ -6,10 +6,6 @@
 //! levels and memory with the windows, steps with the cameras. What remains are measurements that
 //! nothing else in the plan tells, such as noise. They are bounded.
 
-use reconstruct::{
-    CELLS_MAX, DsmGrid, HeightRange, ImagePair, PYRAMID_LEVELS_MAX, choose_levels, pair_geometry, smallest_sides,
-    snapped,
-};
 use std::collections::{BTreeMap, BTreeSet};
 
 use camera::{ImageCorrection, RpcCamera};
@@ -17,6 +13,10 @@ use crs::MapProjection;
 use geodesy::LonLatHeight;
 use io::raster::iso_time;
 use raster::Window;
+use reconstruct::{
+    CELLS_MAX, DsmGrid, HeightRange, ImagePair, PYRAMID_LEVELS_MAX, choose_levels, pair_geometry, smallest_sides,
+    snapped,
+};
 
 use crate::error::DsmError;
 use crate::images::character::ImageCharacter;

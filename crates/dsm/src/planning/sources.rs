@@ -1,9 +1,8 @@
 //! For each view, the choice of the views that it is compared with.
 
-use reconstruct::{ImagePair, SourceCandidates, SweepTuning, ViewGeometry};
 use std::collections::BTreeMap;
 
-use geo::Polygon;
+use reconstruct::{ImagePair, SourceCandidates, SweepTuning, ViewGeometry};
 
 use crate::config::DsmConfig;
 use crate::error::{DsmError, DsmSetting};
@@ -23,8 +22,7 @@ pub(crate) fn choose_sources(
     notes: &mut Notes<'_>,
 ) -> Result<Vec<Vec<usize>>, DsmError> {
     let candidates = source_candidates(config, geometry, pointed, tuning);
-    let parts: Vec<Option<Polygon<f64>>> = geometry.outlines.iter().cloned().map(Some).collect();
-    let sources = candidates.choose(&parts);
+    let sources = candidates.choose_everywhere();
     let text = if sources.len() > LISTED_MAX {
         let used = sources.iter().map(Vec::len).sum::<usize>();
         format!("{used} for {} images; each chunk chooses its own", sources.len())

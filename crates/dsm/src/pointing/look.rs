@@ -99,8 +99,7 @@ fn look_at(
     let useful = geometry.useful_pairs()?;
     let asked = asked_pairs(config, images, &useful)?;
     let pairs = if config.pairs.is_some() { asked } else { tie_pairs(images, &geometry, &asked) };
-    let gsds = images.iter().enumerate().filter_map(|(i, image)| geometry.ground_sampling_m(&image.camera, i));
-    let gsd = gsds.fold(0.0, f64::max);
+    let gsd = geometry.coarsest_sampling_m(images.iter().map(|image| &image.camera));
     let grid = choose_grid(config, &geometry, gsd)?;
     let progress = session.progress;
     let is_whole = config.bounds.is_none() && config.area.is_none() && fits(config, images, &grid);

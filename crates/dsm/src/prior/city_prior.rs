@@ -1,6 +1,5 @@
 //! A city model as the prior of the height sweep.
 
-use reconstruct::{DsmGrid, MapBounds, ViewPrior};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
@@ -9,6 +8,7 @@ use cityfiles::CityError;
 use crs::CrsError;
 use numeric::{Failure, failures};
 use priors::{LinesOfSight, ModelPlace, PriorModel, PriorsError, SatelliteMaps, buildings_of};
+use reconstruct::{DsmGrid, MapBounds, ViewPrior};
 use report::{counted, plain_number};
 use sweep::SweepView;
 

@@ -1,7 +1,8 @@
 //! What a run tells of the buildings of a city model that it left out.
 
-use reconstruct::PriorFindings;
 use std::path::PathBuf;
+
+use reconstruct::PriorFindings;
 
 use crate::notes::Notes;
 use crate::report::{LeftOut, PriorReport};

@@ -81,6 +81,11 @@ impl<'a> SourceCandidates<'a> {
         parts
     }
 
+    /// Chooses the sources of each view over all that it shows.
+    pub fn choose_everywhere(&self) -> Vec<Vec<usize>> {
+        self.choose(&self.outlines.iter().cloned().map(Some).collect::<Parts>())
+    }
+
     /// Chooses the sources of each view over the part of it that counts, in the frame of the
     /// outlines. A view without a part has no sources and is none.
     pub fn choose(&self, parts: &[Option<Polygon<f64>>]) -> Vec<Vec<usize>> {

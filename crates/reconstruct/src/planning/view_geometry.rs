@@ -115,6 +115,13 @@ impl ViewGeometry {
         camera.gsd(self.middle_of(image)).ok().map(|g| g.mean_m())
     }
 
+    /// Returns the side of the largest pixel on the ground, metres. `cameras` are those of all
+    /// images in their order.
+    pub fn coarsest_sampling_m<'a>(&self, cameras: impl IntoIterator<Item = &'a RpcCamera>) -> f64 {
+        let sides_m = cameras.into_iter().enumerate().filter_map(|(i, camera)| self.ground_sampling_m(camera, i));
+        sides_m.fold(0.0, f64::max)
+    }
+
     /// Returns the pairs that can give heights, the best angles first.
     ///
     /// # Errors

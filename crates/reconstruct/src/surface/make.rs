@@ -45,6 +45,11 @@ pub struct SurfaceOptions {
     pub tile: usize,
 }
 
+impl SurfaceOptions {
+    /// Side of the tiles where none is given, cells.
+    pub const USUAL_TILE: usize = 1024;
+}
+
 /// Everything but pixels and heights that a surface is made from.
 #[derive(Clone, Copy)]
 pub struct SurfaceInput<'a> {
@@ -133,8 +138,8 @@ impl SurfaceCounts {
     }
 }
 
-/// Makes the surface; returns the cells of the core and their counts. Each view, and the fusion, is
-/// a step of `progress`.
+/// Makes the surface; returns the cells of the core and their counts. It is a stage of `progress`,
+/// of which each view, and the fusion, is a step.
 ///
 /// # Errors
 /// [`ReconstructError::Sweep`] for a camera that fails inside the scene, [`ReconstructError::Crs`],
@@ -146,6 +151,7 @@ pub fn make_surface(
     progress: &dyn Progress,
 ) -> Result<(SurfaceRasters, SurfaceCounts), ReconstructError> {
     let SurfaceInput { options, sweep, useful, grid, .. } = input;
+    progress.begin("fusing", 1 + sweep.sources.iter().filter(|sources| !sources.is_empty()).count());
     let finest = sweep.levels.finest;
     let projection = grid.projection()?;
     let map_from_ground = |g: geodesy::LonLatHeight| projection.map_from_lonlat(g.lon_deg, g.lat_deg).ok();
