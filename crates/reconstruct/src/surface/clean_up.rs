@@ -9,7 +9,7 @@ use sweep::fusion::{
     CellSource, FillConfig, FillRule, FusedSurface, GridSight, KnownVoids, TrendConfig, Trust, TrustConfig, calibrate,
     fill_voids, ground_trend, occlusion_bounds, remove_speckle, surroundings,
 };
-use terrain::{GroundConfig, bare_ground_by_openings, goes_through_roofs};
+use terrain::{GroundConfig, bare_ground_of_observed, goes_through_roofs, shows_hardly_but_roofs};
 
 use crate::surface::fill::Fill;
 
@@ -139,7 +139,7 @@ pub(crate) fn clean_up(
 }
 
 /// Returns the ground under the trusted heights, metres, NaN far from any, and the quarters of
-/// which hardly any ground is known: the trend is their ground.
+/// which hardly any ground is known. Where it goes through roofs, the trend is the ground.
 ///
 /// The ground tells how low a void may be. Voids are filled relative to the trend all the same:
 /// that is even, and the ground repeats the noise of the heights that it goes through.
@@ -148,11 +148,12 @@ fn ground_under(height_m: &Grid<f32>, trusted: &Grid<bool>, trend: &Grid<f32>, g
     let doubted = seen.data_mut().iter_mut().zip(trusted.data()).filter(|(_, is_trusted)| !**is_trusted);
     doubted.for_each(|(height, _)| *height = f32::NAN);
     let unobserved = seen.map(|h| h.is_nan());
-    let found = bare_ground_by_openings(&seen, &unobserved, gsd_m, &GroundConfig::default(), &Silent);
+    let found = bare_ground_of_observed(&seen, Some(&unobserved), gsd_m, &GroundConfig::default(), &Silent);
     let mut ground_m = found.expect("the cells and the default settings are valid, and nothing cancels").heights;
-    let only_roofs = goes_through_roofs(&ground_m, height_m, trend, gsd_m);
-    let cells = ground_m.data_mut().iter_mut().zip(trend.data()).zip(only_roofs.data());
-    cells.filter(|(_, only_roofs)| **only_roofs).for_each(|((ground_m, trend_m), _)| *ground_m = *trend_m);
+    let is_through = goes_through_roofs(&ground_m, height_m, trend, gsd_m);
+    let cells = ground_m.data_mut().iter_mut().zip(trend.data()).zip(is_through.data());
+    cells.filter(|(_, is_through)| **is_through).for_each(|((ground_m, trend_m), _)| *ground_m = *trend_m);
+    let only_roofs = shows_hardly_but_roofs(height_m, &ground_m, gsd_m);
     (ground_m, only_roofs)
 }
 
