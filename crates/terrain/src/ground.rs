@@ -105,6 +105,43 @@ pub fn bare_ground_of_observed(
     config: &GroundConfig,
     progress: &dyn Progress,
 ) -> Result<BareGround, TerrainError> {
+    let search = unobserved.map_or(Search::Openings, |_| Search::OpeningsAndPlanes);
+    searched((surface, unobserved), cell_m, config, search, progress)
+}
+
+/// Finds the ground as [`bare_ground_of_observed`] does, by openings alone. It takes roofs for
+/// ground that are flush with a slope, but keeps hollows of which little is observed: planes take
+/// their ground for wrong heights.
+///
+/// # Errors
+/// As [`bare_ground_of_observed`].
+pub fn bare_ground_by_openings(
+    surface: &Grid<f32>,
+    unobserved: &Grid<bool>,
+    cell_m: f64,
+    config: &GroundConfig,
+    progress: &dyn Progress,
+) -> Result<BareGround, TerrainError> {
+    searched((surface, Some(unobserved)), cell_m, config, Search::Openings, progress)
+}
+
+/// How objects are told from ground.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Search {
+    /// By the walls of what openings cut off. The points of a cloud show the whole border of what
+    /// stands out.
+    Openings,
+    /// Beside it, by planes through the ground around.
+    OpeningsAndPlanes,
+}
+
+fn searched(
+    (surface, unobserved): (&Grid<f32>, Option<&Grid<bool>>),
+    cell_m: f64,
+    config: &GroundConfig,
+    search: Search,
+    progress: &dyn Progress,
+) -> Result<BareGround, TerrainError> {
     config.validate()?;
     if !(cell_m > 0.0 && cell_m.is_finite()) {
         return Err(TerrainError::CellSize { found: cell_m });
@@ -128,8 +165,13 @@ pub fn bare_ground_of_observed(
             let whole_m = without_pits(&without_cells(&whole_m, &is_pit));
             let surface_m = without_cells(&whole_m, &is_void);
             let evidence_m = without_cells(&surface_m, &islands(&surface_m, work_m));
-            let is_sunken = OffPlanes::new(&evidence_m, work_m, noise_m, config).sunken();
-            let evidence_m = without_cells(&evidence_m, &is_sunken);
+            let evidence_m = match search {
+                Search::Openings => evidence_m,
+                Search::OpeningsAndPlanes => {
+                    let is_sunken = OffPlanes::new(&evidence_m, work_m, noise_m, config).sunken();
+                    without_cells(&evidence_m, &is_sunken)
+                }
+            };
             (whole_m, surface_m, evidence_m)
         }
         // Voids between the points of a cloud are usual: they make no islands, and hide no drops.
@@ -157,8 +199,7 @@ pub fn bare_ground_of_observed(
                 objects(&heights, (&trend(&known, work_m, later), &smooth_slopes(&known, work_m)), config, progress)?;
             add(&mut found, &again);
         }
-        // The points of a cloud show the whole border of what stands out.
-        if unobserved.is_some() {
+        if search == Search::OpeningsAndPlanes {
             found = OffPlanes::new(&evidence_m, work_m, noise_m, config).no_ground(&clear_m, &found);
         }
     }

@@ -53,6 +53,9 @@ mod trend;
 
 pub use config::GroundConfig;
 pub use error::TerrainError;
-pub use ground::{BareGround, GROUND, UNDER_OBJECT, UNKNOWN, VOID_FILLED, bare_ground, bare_ground_of_observed};
+pub use ground::{
+    BareGround, GROUND, UNDER_OBJECT, UNKNOWN, VOID_FILLED, bare_ground, bare_ground_by_openings,
+    bare_ground_of_observed,
+};
 pub use roofs::{goes_through_roofs, shows_hardly_but_roofs};
 pub use smooth::without_noise;

@@ -9,7 +9,10 @@ use sweep::fusion::{
     CellSource, FillConfig, FillRule, FusedSurface, GridSight, KnownVoids, TrendConfig, Trust, TrustConfig, calibrate,
     fill_voids, ground_trend, occlusion_bounds, remove_speckle, surroundings,
 };
-use terrain::{GroundConfig, bare_ground_of_observed, goes_through_roofs, shows_hardly_but_roofs};
+use terrain::{
+    BareGround, GroundConfig, TerrainError, bare_ground_by_openings, bare_ground_of_observed, goes_through_roofs,
+    shows_hardly_but_roofs,
+};
 
 use crate::surface::fill::Fill;
 
@@ -148,9 +151,15 @@ fn ground_under(height_m: &Grid<f32>, trusted: &Grid<bool>, trend: &Grid<f32>, g
     let doubted = seen.data_mut().iter_mut().zip(trusted.data()).filter(|(_, is_trusted)| !**is_trusted);
     doubted.for_each(|(height, _)| *height = f32::NAN);
     let unobserved = seen.map(|h| h.is_nan());
-    let found = bare_ground_of_observed(&seen, Some(&unobserved), gsd_m, &GroundConfig::default(), &Silent);
-    let mut ground_m = found.expect("the cells and the default settings are valid, and nothing cancels").heights;
-    let is_through = goes_through_roofs(&ground_m, height_m, trend, gsd_m);
+    let config = GroundConfig::default();
+    let heights = |found: Result<BareGround, TerrainError>| {
+        found.expect("the cells and the default settings are valid, and nothing cancels").heights
+    };
+    // Each of the two is too high in places of its own: on roofs of slopes, and over hollows.
+    let by_planes_m = heights(bare_ground_of_observed(&seen, Some(&unobserved), gsd_m, &config, &Silent));
+    let by_openings_m = heights(bare_ground_by_openings(&seen, &unobserved, gsd_m, &config, &Silent));
+    let mut ground_m = combined(&by_planes_m, &by_openings_m, f32::min);
+    let is_through = goes_through_roofs(&by_planes_m, height_m, trend, gsd_m);
     let cells = ground_m.data_mut().iter_mut().zip(trend.data()).zip(is_through.data());
     cells.filter(|(_, is_through)| **is_through).for_each(|((ground_m, trend_m), _)| *ground_m = *trend_m);
     let only_roofs = shows_hardly_but_roofs(height_m, &ground_m, gsd_m);
