@@ -325,8 +325,8 @@ pub struct SurfaceReport {
     /// Number of those of them that lie under a mask or outside the area.
     #[serde(default)]
     pub masked: usize,
-    /// Number of filled cells between roofs, in quarters of which hardly any ground is known: their
-    /// ground is that under the lowest heights around.
+    /// Number of filled cells between roofs, in quarters of which hardly any ground is known: they
+    /// have the ground there as far as it is known, or that under the lowest heights around.
     #[serde(default)]
     pub streets: usize,
     /// Number of cells removed as speckle.

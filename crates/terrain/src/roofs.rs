@@ -33,9 +33,10 @@ const QUARTER_M: f64 = 100.0;
 const EVEN_M: f32 = 0.4;
 
 /// Returns where the ground that was found in a surface with cells of `cell_m` metres goes through
-/// roofs: in parts with many voids that lie more than a storey above `lower`, a trend under the
-/// lowest heights around, and above some heights of the surface, but below more. Some heights must
-/// lie at the trend, and the others must be as even as roofs are: between crowns there are crowns.
+/// roofs. It does so in parts of which a third is void, and where it lies more than a storey above
+/// `lower`, a trend under the lowest heights around. Some heights of such a part lie more than a
+/// storey below this ground, and more of them lie that far over it. Some must lie at the trend, and
+/// all must be as even as roofs are: between crowns there are crowns.
 ///
 /// All three are in metres. Voids of the surface, and places without ground, are NaN.
 ///
@@ -115,17 +116,19 @@ struct Quarter {
     radius: usize,
     /// Cells of the surface.
     size: (usize, usize),
-    /// Share of the cells with heights, of those more than a storey below the ground, those within
-    /// a storey of it, and those more than a storey over it.
+    /// Share of cells with a height.
     known: Grid<f32>,
+    /// Share of cells with a height more than a storey below the ground.
     beneath: Grid<f32>,
+    /// Share of cells with a height within a storey of the ground.
     at: Grid<f32>,
+    /// Share of cells with a height more than a storey over the ground.
     over: Grid<f32>,
     /// Deviations from the planes around, metres.
     uneven: Grid<f32>,
 }
 
-/// The same of a part of a surface.
+/// The means of [`Quarter`] over a part of the surface, and the size of that part.
 struct Part {
     area_m2: f64,
     known: f32,

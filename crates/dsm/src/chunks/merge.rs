@@ -244,7 +244,7 @@ fn warn_of_streets(plan: &Plan, counts: &SurfaceCounts, notes: &mut Notes<'_>) {
     if share >= STREETS_WEAK {
         notes.warn(format!(
             "{:.0} % of the cells lie between roofs in quarters of which hardly any ground was seen; they were filled \
-             with the ground under the lowest heights around, which may be off by metres; source.tif has 5 there: {}",
+             with the ground there as far as it is known, which may be off by metres; source.tif has 5 there: {}",
             100.0 * share,
             image_names(plan)
         ));

@@ -4341,7 +4341,7 @@ class SurfaceReport(Report):
 
     streets: int
     """Number of filled cells between roofs, in quarters of which hardly any ground is known:
-    their ground is that under the lowest heights around."""
+    they have the ground there as far as it is known, or that under the lowest heights around."""
 
     speckle_removed: int
     """Number of cells removed as speckle."""

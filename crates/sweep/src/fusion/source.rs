@@ -21,8 +21,8 @@ pub enum CellSource {
     FilledSurface = 3,
     /// Filled: a narrow gap that two views see.
     FilledNarrow = 4,
-    /// Filled: between roofs, in a quarter of which hardly any ground is known. The ground under
-    /// the lowest heights around.
+    /// Filled: between roofs, in a quarter of which hardly any ground is known. The ground there as
+    /// far as it is known, or that under the lowest heights around.
     FilledStreet = 5,
     /// Void: two views see it and do not match: change, water, too little texture.
     Unmatched = 10,
