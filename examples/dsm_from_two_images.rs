@@ -26,6 +26,6 @@ fn main() -> Result<(), Box<dyn Error>> {
     for choice in &report.choices {
         println!("{}: {} ({})", choice.name, choice.value, choice.reason);
     }
-    println!("{} cells observed, in {}", report.surface.observed, config.output.join("dsm/dsm.tif").display());
+    println!("{} cells observed, in {}", report.surface.counts.observed, config.output.join("dsm/dsm.tif").display());
     Ok(())
 }

@@ -166,7 +166,7 @@ fn a_lost_standard_error_does_not_stop_the_work() {
 const COMPUTED: usize = 24;
 /// Parts of a plan that are measured or asked for, and that nothing else in the plan tells.
 const MEASURED: [&str; 6] =
-    ["/plan/config", "/plan/characters", "/height_range", "/plan/step_m", "/plan/pixel_m", "/plan/report/pointing"];
+    ["/plan/config", "/plan/radiometry", "/height_range", "/plan/step_m", "/plan/pixel_m", "/plan/report/pointing"];
 /// Elements at both ends of an array that are forged.
 const ENDS: usize = 1;
 

@@ -443,9 +443,9 @@ fn heights_that_are_not_finite_or_were_never_searched_are_refused() {
         let told = merged(&set(height_m)).unwrap_err();
         assert!(told.contains("chunk 2") && told.contains(found) && told.contains("compute it again"), "{told}");
     }
-    let told = merged(&|surface| surface.counts.void += 1).unwrap_err();
+    let told = merged(&|surface| surface.summary.counts.cells.void += 1).unwrap_err();
     assert!(told.contains("void") && told.contains("chunk 2"), "{told}");
-    let told = merged(&|surface| surface.height_range.high_m += 1.0).unwrap_err();
+    let told = merged(&|surface| surface.summary.height_range.high_m += 1.0).unwrap_err();
     assert!(told.contains("expected heights from"), "{told}");
     assert!(!folder.path().join("merged/dsm").exists());
     merged(&|_| {}).unwrap();

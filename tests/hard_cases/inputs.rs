@@ -25,7 +25,7 @@ fn run_floats(images: &[(Grid<f32>, camera::Rpc)]) -> DsmReport {
 
 #[test]
 fn float_images_of_any_scale_are_matched() {
-    let observed = |report: &DsmReport| report.surface.observed as f64 / report.surface.cells as f64;
+    let observed = |report: &DsmReport| report.surface.counts.observed as f64 / report.surface.cells as f64;
     let expected = observed(&EASY.outcome.report);
     for [first, second] in [[1.0 / 2047.0, 1.0 / 2047.0], [1e-6, 3.7e8], [1.0, 1e-4]] {
         let scaled = |shot: &Shot, by: f32| (shot.image.map(|v| f32::from(*v) * by), shot.rpc.clone());

@@ -42,7 +42,7 @@
 //!
 //! // A third one merges them.
 //! let product = merge(&plan, [ChunkResult::read(&chunk)], &Silent)?;
-//! assert!(product.report.surface.observed > 0);
+//! assert!(product.report.surface.counts.observed > 0);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
@@ -67,16 +67,16 @@ mod session;
 mod stac;
 mod writing;
 
-pub use chunks::chunk::{ChunkContent, ChunkResult, ChunkSurface, run_chunk};
+pub use chunks::chunk::{ChunkContent, ChunkResult, ChunkSummary, ChunkSurface, run_chunk};
 pub(crate) use chunks::merge::Merger;
 pub use chunks::merge::{Product, merge};
 pub use config::{DsmConfig, LayerArea};
 pub use error::{DsmError, DsmSetting};
 pub use georeferencing::register::register;
-pub use images::character::ImageCharacter;
 pub(crate) use images::input_stamps::InputStamps;
 pub use images::input_stamps::files_of;
 pub use images::open::{Opened, open};
+pub use images::radiometry::ImageRadiometry;
 pub use images::scene_image::SceneImage;
 pub use planning::chunk_plan::{ChunkPlan, ChunkSweep, ChunkWork};
 pub use planning::plan::{Plan, PlanReport, plan};
@@ -94,6 +94,6 @@ pub(crate) use writing::output::{DsmFolder, refuse_results, write_config};
 pub use writing::output::{FILES, USED_CONFIG};
 
 pub use reconstruct::{
-    BuildingFinding, DsmGrid, Fill, HeightRange, ImagePair, KeptPixels, MapBounds, PairGeometry, Preset, PriorFindings,
-    ReconstructError, ShadowCounts, SurfaceCounts, SurfaceRasters, SweepLevels, SweepTuning, ViewVotes,
+    BuildingFinding, CellCounts, DsmGrid, Fill, HeightRange, ImagePair, KeptPixels, MapBounds, PairGeometry, Preset,
+    PriorFindings, ReconstructError, ShadowCounts, SurfaceCounts, SurfaceRasters, SweepLevels, SweepTuning, ViewVotes,
 };

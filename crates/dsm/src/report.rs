@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use camera::{ImageCorrection, ImagePoint};
 use io::stac::SunPosition;
 use numeric::Choice;
-use reconstruct::{HeightRange, MapBounds, PairGeometry};
+use reconstruct::{CellCounts, HeightRange, MapBounds, PairGeometry};
 use serde::{Deserialize, Serialize};
 use sweep::pointing::{Adjustment, ModelOrder};
 
@@ -316,21 +316,9 @@ impl PointingReport {
 pub struct SurfaceReport {
     /// Number of cells.
     pub cells: usize,
-    /// Number of cells with an observed height.
-    pub observed: usize,
-    /// Number of cells filled from their surroundings.
-    pub filled: usize,
-    /// Number of cells without a height.
-    pub void: usize,
-    /// Number of those of them that lie under a mask or outside the area.
-    #[serde(default)]
-    pub masked: usize,
-    /// Number of filled cells between roofs, in quarters of which hardly any ground is known: they
-    /// have the ground there as far as it is known, or that under the lowest heights around.
-    #[serde(default)]
-    pub streets: usize,
-    /// Number of cells removed as speckle.
-    pub speckle_removed: usize,
+    /// Counts of them by what is known of their heights.
+    #[serde(flatten)]
+    pub counts: CellCounts,
     /// Share of each view's pixels with which another view agrees.
     pub kept_by_view: Vec<f64>,
     /// The same for each image in the order of the configuration; `None` for one that is no view.

@@ -38,7 +38,7 @@ use job::threads;
 /// config.gsd_m = Some(2.0);
 /// config.height_range_m = Some(HeightRange::new(170.0, 280.0));
 /// let report = run(&config, &Silent)?;
-/// assert!(report.surface.observed > report.surface.cells / 2);
+/// assert!(report.surface.counts.observed > report.surface.cells / 2);
 /// assert!(folder.path().join("out/dsm/dsm.tif").is_file());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```

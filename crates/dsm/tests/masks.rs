@@ -132,14 +132,18 @@ fn an_area_is_cut_out_of_the_same_surface() {
             }
         }
     }
-    assert_eq!(report.surface.masked, size.0 * size.1 - inside / 4);
+    assert_eq!(report.surface.counts.masked, size.0 * size.1 - inside / 4);
     assert!(report.text(&cut.output).contains("% masked)"));
 
     // Without bounds, the grid is the rectangle around the polygon. Chunks beside it are not swept.
     let mut alone = config(&originals(), folder.path().join("alone"));
     (alone.area, alone.chunk) = (Some(area), Some(64));
     let report = made(&alone);
-    assert!(report.surface.cells < size.0 * size.1 && report.surface.observed > inside / 8, "{:?}", report.surface);
+    assert!(
+        report.surface.cells < size.0 * size.1 && report.surface.counts.observed > inside / 8,
+        "{:?}",
+        report.surface
+    );
     let mut missing = LayerArea::new(file);
     missing.name = Some("south".to_owned());
     alone.area = Some(missing);
@@ -193,7 +197,7 @@ fn masked_ground_is_void_and_fills_nothing() {
         (in_zone, in_lake) = (in_zone + usize::from(is_zone), in_lake + usize::from(is_lake));
     }
     assert!(in_zone > 100 && in_lake > 100, "{in_zone} {in_lake}");
-    assert!(report.surface.masked <= size.0 * size.1 && report.surface.masked >= in_zone.max(in_lake));
+    assert!(report.surface.counts.masked <= size.0 * size.1 && report.surface.counts.masked >= in_zone.max(in_lake));
 
     // A raster without a system, and a file that is none.
     for (path, words) in [(town("view_1.tif"), "image masks"), (folder.path().join("absent.geojson"), "No such file")] {

@@ -78,7 +78,7 @@ pub fn sweep_views(
 /// let (preset, fill) = (Preset::Balanced, Fill::Justified);
 /// let (rasters, counts) = surface_of_views(images, &grid, range, preset, fill, &Silent)?;
 /// let first_m = rasters.origin_m + f64::from(rasters.height_m[(0, 0)]);
-/// println!("{} cells observed, the first one at {first_m} m", counts.observed);
+/// println!("{} cells observed, the first one at {first_m} m", counts.cells.observed);
 /// # Ok::<(), reconstruct::ReconstructError>(())
 /// ```
 pub fn surface_of_views(

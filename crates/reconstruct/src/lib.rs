@@ -47,7 +47,7 @@ pub use scene_sweep::{LatticeHeights, SceneHeights, SceneSweep, sweep_scene};
 pub use surface::clean_up::SURROUNDINGS_M;
 pub use surface::fill::Fill;
 pub use surface::ground_mask::GroundMask;
-pub use surface::make::{KeptPixels, SurfaceCounts, SurfaceInput, SurfaceOptions, make_surface};
+pub use surface::make::{CellCounts, KeptPixels, SurfaceCounts, SurfaceInput, SurfaceOptions, make_surface};
 pub use surface::rasters::SurfaceRasters;
 pub use surface::shadow_side::{ShadowCounts, ShadowSide, shadow_side};
 pub use tuning::{Preset, SweepTuning};

@@ -214,7 +214,7 @@ fn read_row_with<S: LeastSum>(token: S, row: ReadRow<'_, '_>) {
 }
 
 impl Reader<'_> {
-    /// Adds the support of the heights by the picture, and returns the map. A block whose picture
+    /// Adds the support of the heights by the image, and returns the map. A block whose image
     /// has a single value has no heights.
     fn finish(self) -> HeightMap {
         let Self { reference, window, core, best, mut out, .. } = self;

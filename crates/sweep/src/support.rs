@@ -4,7 +4,7 @@
 //! The aggregation carries heights into places without texture (a saturated roof, an undeclared
 //! void) or with different texture in every view (water). Costs there are no better than chance.
 //! The cost of a single pixel does not show that, but the mean over a window does. Unrelated
-//! pictures differ by as much as the contrast of one of them, so that `1 − Σ cost / Σ contrast` is
+//! images differ by as much as the contrast of one of them, so that `1 − Σ cost / Σ contrast` is
 //! 0 there. The contrast is the mean of the absolute graded census of the reference.
 
 use multiversion::multiversion;
@@ -14,7 +14,7 @@ use crate::cost::{COST_MAX, census_scale};
 use crate::view::ViewLevel;
 use crate::window_sums::window_sums;
 
-/// Half width of the window, pixels. Over its 81 pixels the mean cost of unrelated pictures
+/// Half width of the window, pixels. Over its 81 pixels the mean cost of unrelated images
 /// scatters by a few percent only.
 const REACH: usize = 4;
 

@@ -3,9 +3,10 @@
 use numeric::{Muted, Progress};
 use raster::Window;
 use reconstruct::{
-    HeightRange, PriorFindings, SceneSweep, SurfaceCounts, SurfaceInput, SurfaceOptions, SurfaceRasters, make_surface,
-    sweep_scene,
+    CellCounts, HeightRange, PriorFindings, SceneSweep, SurfaceCounts, SurfaceInput, SurfaceOptions, SurfaceRasters,
+    make_surface, sweep_scene,
 };
+use serde::{Deserialize, Serialize};
 use sweep::SweepView;
 
 use crate::error::DsmError;
@@ -49,6 +50,15 @@ pub enum ChunkContent {
 pub struct ChunkSurface {
     /// Rasters of the core.
     pub rasters: SurfaceRasters,
+    /// What else is known of it.
+    pub summary: ChunkSummary,
+}
+
+/// What is known of the surface of a chunk beside its rasters.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[non_exhaustive]
+pub struct ChunkSummary {
     /// Counts of cells and pixels.
     pub counts: SurfaceCounts,
     /// Number of pixel-hypothesis pairs evaluated.
@@ -63,8 +73,9 @@ impl ChunkSurface {
     /// Makes the surface of a chunk of which no cell gets a height.
     fn masked(core: Window, height_range: HeightRange) -> Self {
         let rasters = SurfaceRasters::masked((core.width, core.height));
-        let counts = SurfaceCounts::of(&rasters);
-        Self { rasters, counts, hypotheses: 0, height_range, findings: PriorFindings::default() }
+        let counts = SurfaceCounts { cells: CellCounts::of(&rasters), views: Vec::new() };
+        let summary = ChunkSummary { counts, hypotheses: 0, height_range, findings: PriorFindings::default() };
+        Self { rasters, summary }
     }
 }
 
@@ -121,7 +132,7 @@ fn sweep_chunk(
     let views = match session.views.take().filter(|_| is_whole) {
         Some(views) => views,
         None => {
-            let mut views = read_chunk_views(&plan.images, &plan.characters, &work.windows, read_view)?;
+            let mut views = read_chunk_views(&plan.images, &plan.radiometry, &work.windows, read_view)?;
             void_surplus(plan, work, &mut views)?;
             views
         }
@@ -157,5 +168,6 @@ fn sweep_chunk(
     if is_whole {
         session.lap("fusion");
     }
-    Ok(ChunkSurface { rasters, counts, hypotheses, height_range: work.height_range, findings })
+    let summary = ChunkSummary { counts, hypotheses, height_range: work.height_range, findings };
+    Ok(ChunkSurface { rasters, summary })
 }

@@ -3,7 +3,7 @@
 //! A result may have been computed elsewhere. Heights that are not finite or that the plan never
 //! searched, and counts that are not those of the rasters, are no result.
 
-use reconstruct::{HeightRange, SURROUNDINGS_M, SurfaceCounts};
+use reconstruct::{CellCounts, HeightRange, SURROUNDINGS_M};
 
 use crate::chunks::chunk::{ChunkContent, ChunkResult, ChunkSurface};
 use crate::error::DsmError;
@@ -42,8 +42,8 @@ impl ChunkResult {
 
 impl ChunkSurface {
     fn misfit(&self, plan: &Plan, work: &ChunkSweep) -> Option<Misfit> {
-        if self.height_range != work.height_range {
-            return Some((in_words(self.height_range), in_words(work.height_range)));
+        if self.summary.height_range != work.height_range {
+            return Some((in_words(self.summary.height_range), in_words(work.height_range)));
         }
         self.misfit_of_heights(plan, work).or_else(|| self.misfit_of_counts(plan))
     }
@@ -75,15 +75,16 @@ impl ChunkSurface {
     }
 
     fn misfit_of_counts(&self, plan: &Plan) -> Option<Misfit> {
-        let told = |counts: &SurfaceCounts| {
-            let SurfaceCounts { observed, filled, void, masked, .. } = counts;
+        let counts = &self.summary.counts;
+        let told = |cells: CellCounts| {
+            let CellCounts { observed, filled, void, masked, .. } = cells;
             format!("{observed} observed, {filled} filled, {void} void and {masked} masked cells")
         };
-        let (own, counted) = (told(&self.counts), told(&SurfaceCounts::of(&self.rasters)));
+        let (own, counted) = (told(counts.cells), told(CellCounts::of(&self.rasters)));
         if own != counted {
             return Some((own, counted));
         }
-        let (views, images) = (self.counts.views.len(), plan.images.len());
+        let (views, images) = (counts.views.len(), plan.images.len());
         (views > images).then(|| (format!("counts of {views} views"), format!("at most {images}")))
     }
 }

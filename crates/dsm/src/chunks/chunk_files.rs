@@ -10,10 +10,10 @@ use std::path::Path;
 
 use io::npy::NpyData;
 use raster::{Grid, Window};
-use reconstruct::{HeightRange, PriorFindings, SurfaceCounts, SurfaceRasters};
+use reconstruct::SurfaceRasters;
 use serde::{Deserialize, Serialize};
 
-use crate::chunks::chunk::{ChunkContent, ChunkResult, ChunkSurface};
+use crate::chunks::chunk::{ChunkContent, ChunkResult, ChunkSummary, ChunkSurface};
 use crate::error::DsmError;
 use job::files::TEXT_LIMIT;
 
@@ -33,17 +33,9 @@ struct ChunkRecord {
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 enum Status {
-    Surface {
-        origin_m: f64,
-        counts: SurfaceCounts,
-        hypotheses: u64,
-        height_range: HeightRange,
-        findings: PriorFindings,
-    },
+    Surface { origin_m: f64, summary: ChunkSummary },
     Unseen,
-    Failed {
-        reason: String,
-    },
+    Failed { reason: String },
 }
 
 impl ChunkResult {
@@ -76,13 +68,7 @@ impl ChunkResult {
             ChunkContent::Failed { reason } => Status::Failed { reason: reason.clone() },
             ChunkContent::Surface(surface) => {
                 write_rasters(folder, &surface.rasters).map_err(std::io::Error::other)?;
-                Status::Surface {
-                    origin_m: surface.rasters.origin_m,
-                    counts: surface.counts.clone(),
-                    hypotheses: surface.hypotheses,
-                    height_range: surface.height_range,
-                    findings: surface.findings.clone(),
-                }
+                Status::Surface { origin_m: surface.rasters.origin_m, summary: surface.summary.clone() }
             }
         };
         let json = serde_json::to_string_pretty(&ChunkRecord { core: self.core, status })?;
@@ -102,9 +88,9 @@ impl ChunkResult {
         let content = match status {
             Status::Unseen => ChunkContent::Unseen,
             Status::Failed { reason } => ChunkContent::Failed { reason },
-            Status::Surface { origin_m, counts, hypotheses, height_range, findings } => {
+            Status::Surface { origin_m, summary } => {
                 let rasters = read_rasters(folder, origin_m, core)?;
-                ChunkContent::Surface(Box::new(ChunkSurface { rasters, counts, hypotheses, height_range, findings }))
+                ChunkContent::Surface(Box::new(ChunkSurface { rasters, summary }))
             }
         };
         Ok(Self { core, content })

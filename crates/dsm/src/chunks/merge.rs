@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use numeric::Progress;
 use raster::Window;
-use reconstruct::{HeightRange, PriorFindings, ShadowSide, SurfaceCounts, shadow_side};
+use reconstruct::{CellCounts, HeightRange, PriorFindings, ShadowSide, SurfaceCounts, SurfaceRasters, shadow_side};
 
-use crate::chunks::chunk::{ChunkContent, ChunkResult, ChunkSurface};
+use crate::chunks::chunk::{ChunkContent, ChunkResult, ChunkSummary, ChunkSurface};
 use crate::error::DsmError;
 use crate::memory;
 use crate::notes::Notes;
@@ -54,7 +54,7 @@ pub(crate) struct Merger<'a> {
 /// Place of the cells until the files are made.
 enum Target<'a> {
     /// A scene that was computed at once stays in memory.
-    Whole(DsmFolder, Option<Box<ChunkSurface>>),
+    Whole(DsmFolder, Option<SurfaceRasters>),
     /// The chunks of a large scene go to the disk.
     Chunked(ChunkedOutput<'a>),
 }
@@ -97,15 +97,16 @@ impl<'a> Merger<'a> {
             }
             ChunkContent::Failed { reason } => self.add_failed(core, reason),
             ChunkContent::Surface(surface) => {
-                self.counts.add(&surface.counts);
-                self.hypotheses = self.hypotheses.saturating_add(surface.hypotheses);
-                let range = surface.height_range;
+                let ChunkSurface { rasters, summary } = *surface;
+                let ChunkSummary { counts, hypotheses, height_range: range, findings } = summary;
+                self.counts.add(&counts);
+                self.hypotheses = self.hypotheses.saturating_add(hypotheses);
                 self.height_range = Some(self.height_range.map_or(range, |all| all.union(range)));
-                self.findings.extend(&surface.findings);
+                self.findings.extend(&findings);
                 self.chunks.done += 1;
                 match &mut self.target {
-                    Target::Whole(_, place) => *place = Some(surface),
-                    Target::Chunked(output) => output.put(core, &surface.rasters)?,
+                    Target::Whole(_, place) => *place = Some(rasters),
+                    Target::Chunked(output) => output.put(core, &rasters)?,
                 }
             }
         }
@@ -127,7 +128,7 @@ impl<'a> Merger<'a> {
     }
 
     fn leave_void(&mut self, core: Window) {
-        self.counts.void += core.width * core.height;
+        self.counts.cells.void += core.width * core.height;
     }
 
     /// Writes the files. `times` are the wall times of the stages.
@@ -139,11 +140,11 @@ impl<'a> Merger<'a> {
     pub(crate) fn finish(mut self, times: &[StageTime]) -> Result<Product, DsmError> {
         self.progress.check_cancelled()?;
         let plan = self.plan;
-        if self.counts.observed == 0 {
+        if self.counts.cells.observed == 0 {
             return Err(self.error.unwrap_or(DsmError::NoSurface { range: plan.height_range }));
         }
-        warn_of_share(plan, &self.counts, &mut self.notes);
-        warn_of_streets(plan, &self.counts, &mut self.notes);
+        warn_of_share(plan, &self.counts.cells, &mut self.notes);
+        warn_of_streets(plan, &self.counts.cells, &mut self.notes);
         warn_of_shadows(plan, &self.counts, &mut self.notes);
         let prior = plan.config.prior.clone().map(|model| report_findings(&self.findings, model, &mut self.notes));
         self.progress.begin("writing", 1);
@@ -165,9 +166,9 @@ impl<'a> Merger<'a> {
             peak_memory_mb: memory::peak_mb(),
         };
         match self.target {
-            Target::Whole(folder, surface) => {
-                let surface = surface.ok_or(DsmError::ChunksMissing { found: 0, count: 1 })?;
-                output::write_whole(&folder, &plan.config, &plan.grid, &surface.rasters, &report)?;
+            Target::Whole(folder, rasters) => {
+                let rasters = rasters.ok_or(DsmError::ChunksMissing { found: 0, count: 1 })?;
+                output::write_whole(&folder, &plan.config, &plan.grid, &rasters, &report)?;
             }
             Target::Chunked(output) => output.finish(&report)?,
         }
@@ -208,7 +209,7 @@ pub fn merge(
 }
 
 /// Warns when hardly any cell has an observed height, and when fewer have one than are filled.
-fn warn_of_share(plan: &Plan, counts: &SurfaceCounts, notes: &mut Notes<'_>) {
+fn warn_of_share(plan: &Plan, counts: &CellCounts, notes: &mut Notes<'_>) {
     let (columns, rows) = plan.grid.size;
     if let Some(doubt) = doubt_of_share((columns * rows).saturating_sub(counts.masked), counts) {
         notes.warn(format!("{doubt}: {}", image_names(plan)));
@@ -216,7 +217,7 @@ fn warn_of_share(plan: &Plan, counts: &SurfaceCounts, notes: &mut Notes<'_>) {
 }
 
 /// Returns what the share of observed heights among `cells` says against a surface.
-fn doubt_of_share(cells: usize, counts: &SurfaceCounts) -> Option<String> {
+fn doubt_of_share(cells: usize, counts: &CellCounts) -> Option<String> {
     let share = |part: usize| part as f64 / cells.max(1) as f64;
     let observed = share(counts.observed);
     if observed < OBSERVED_WEAK {
@@ -238,7 +239,7 @@ fn doubt_of_share(cells: usize, counts: &SurfaceCounts) -> Option<String> {
 }
 
 /// Warns when streets were filled without their ground.
-fn warn_of_streets(plan: &Plan, counts: &SurfaceCounts, notes: &mut Notes<'_>) {
+fn warn_of_streets(plan: &Plan, counts: &CellCounts, notes: &mut Notes<'_>) {
     let (columns, rows) = plan.grid.size;
     let share = counts.streets as f64 / (columns * rows).max(1) as f64;
     if share >= STREETS_WEAK {
@@ -278,12 +279,7 @@ fn surface_report(plan: &Plan, counts: &SurfaceCounts) -> SurfaceReport {
     let kept_by_image: Vec<Option<f64>> = kept.collect();
     SurfaceReport {
         cells: plan.grid.size.0 * plan.grid.size.1,
-        observed: counts.observed,
-        filled: counts.filled,
-        void: counts.void,
-        masked: counts.masked,
-        streets: counts.streets,
-        speckle_removed: counts.speckle_removed,
+        counts: counts.cells,
         kept_by_view: kept_by_image.iter().copied().flatten().collect(),
         kept_by_image,
     }
@@ -296,7 +292,7 @@ mod tests {
     #[test]
     fn a_surface_that_is_filled_rather_than_observed_is_doubted() {
         let doubt = |observed, filled, void| {
-            let counts = SurfaceCounts { observed, filled, void, ..SurfaceCounts::default() };
+            let counts = CellCounts { observed, filled, void, ..CellCounts::default() };
             doubt_of_share(observed + filled + void, &counts)
         };
         assert_eq!(doubt(60, 40, 0), None);

@@ -32,8 +32,8 @@ const STEP: f64 = 8.0;
 
 /// A chip that has been read.
 struct OpenChip {
-    picture: Grid<f32>,
-    /// Place of the point in `picture`.
+    image: Grid<f32>,
+    /// Place of the point in `image`.
     point: [f64; 2],
     ground: ChipGround,
 }
@@ -42,9 +42,9 @@ struct OpenChip {
 enum ChipGround {
     /// Unknown: they are taken for those of the image.
     Pixels,
-    /// On a map, by the georeference of the picture.
+    /// On a map, by the georeference of the image.
     Map(GeoTransform, MapProjection),
-    /// Seen by a camera, in the frame of the picture.
+    /// Seen by a camera, in the frame of the image.
     Camera(Box<RpcCamera>),
 }
 
@@ -53,7 +53,7 @@ enum ChipGround {
 ///
 /// # Errors
 /// [`DsmError::Value`] for a chip without the place that is given, [`DsmError::Image`] for a
-/// picture that cannot be read, [`DsmError::Crs`].
+/// image that cannot be read, [`DsmError::Crs`].
 pub(crate) fn find_places(
     point: &GroundPoint,
     ground: LonLatHeight,
@@ -108,19 +108,19 @@ impl OpenChip {
         }
         let pixel = Window { x: place[0] as i64, y: place[1] as i64, width: 1, height: 1 };
         let around = pixel.grown(CHIP_REACH).intersection(&source.window()).unwrap_or(pixel);
-        let picture = source.read_luma(around)?.luma;
+        let image = source.read_luma(around)?.luma;
         let origin = ImagePoint::new(around.x as f64, around.y as f64);
         let ground = match (info.geotransform, &info.crs_wkt) {
             (Some(map), Some(wkt)) => {
                 ChipGround::Map(map.shifted(origin.sample, origin.line), MapProjection::from_definition(wkt)?)
             }
-            // A picture without an RPC is compared as it is.
+            // A image without an RPC is compared as it is.
             _ => match io::rpc::read_for_image(&chip.path) {
                 Ok(found) => ChipGround::Camera(Box::new(RpcCamera::new(found.rpc).cropped(origin))),
                 Err(_) => ChipGround::Pixels,
             },
         };
-        Ok(Self { picture, point: [place[0] - origin.sample, place[1] - origin.line], ground })
+        Ok(Self { image, point: [place[0] - origin.sample, place[1] - origin.line], ground })
     }
 
     /// Searches an image; `None` where the camera does not expect the point in it.
@@ -150,7 +150,7 @@ impl OpenChip {
             reach_px,
             image_from_chip,
         };
-        let chip = Chip { picture: &self.picture, point: self.point };
+        let chip = Chip { image: &self.picture, point: self.point };
         let placed = |ChipPlace { place, score }| {
             let [sample, line] = [place[0] + window.x as f64, place[1] + window.y as f64];
             (ImagePoint::new(sample, line), f64::from(score))

@@ -26,9 +26,9 @@ use sweep::SweepView;
 
 use crate::config::DsmConfig;
 use crate::error::DsmError;
-use crate::images::character::ImageCharacter;
 use crate::images::image_pixels::read_coarse_view;
 use crate::images::image_windows::GroundBox;
+use crate::images::radiometry::ImageRadiometry;
 use crate::images::scene_image::SceneImage;
 use crate::memory;
 use crate::planning::chunk_side::{ALIGNED, MARGIN_PX, SIDE_MIN, aligned, blocks, needed_mb, quarters, with_rim};
@@ -99,7 +99,7 @@ pub(crate) struct ChunkPlanner<'a> {
     pub(crate) tuning: &'a SweepTuning,
     /// Images with corrected cameras.
     pub(crate) images: &'a [SceneImage],
-    pub(crate) characters: &'a [ImageCharacter],
+    pub(crate) radiometry: &'a [ImageRadiometry],
     pub(crate) grid: &'a DsmGrid,
     pub(crate) projection: &'a MapProjection,
     pub(crate) candidates: SourceCandidates<'a>,
@@ -307,7 +307,7 @@ impl ChunkPlanner<'_> {
         let side = windows.iter().flatten().map(|w| w.width.min(w.height)).min().unwrap_or(0);
         let sides: Vec<usize> = (0..ALIGNED.ilog2()).map(|level| side >> level).collect();
         let level = probe::level_of(self.pixel_m, &sides);
-        let views = read_chunk_views(self.images, self.characters, windows, |image, window| {
+        let views = read_chunk_views(self.images, self.radiometry, windows, |image, window| {
             read_coarse_view(image, window, level)
         })?;
         let sweep = SceneSweep::new(wide, self.step_m, SweepLevels::only(level), sources, self.tuning);
@@ -335,15 +335,15 @@ impl ChunkPlanner<'_> {
 /// Those of `read`.
 pub(crate) fn read_chunk_views(
     images: &[SceneImage],
-    characters: &[ImageCharacter],
+    radiometry: &[ImageRadiometry],
     windows: &[Option<Window>],
     read: impl Fn(&SceneImage, Window) -> Result<SweepView, DsmError> + Sync,
 ) -> Result<Vec<SweepView>, DsmError> {
-    let one = |((image, window), character): ((&SceneImage, &Option<Window>), &ImageCharacter)| {
+    let one = |((image, window), radiometry): ((&SceneImage, &Option<Window>), &ImageRadiometry)| {
         let Some(window) = window else { return Ok(SweepView::absent(image.camera.clone())) };
         let mut view = read(image, *window)?;
-        character.lend(&mut view);
+        radiometry.give_to(&mut view);
         Ok(view)
     };
-    images.par_iter().zip(windows).zip(characters).map(one).collect()
+    images.par_iter().zip(windows).zip(radiometry).map(one).collect()
 }

@@ -11,9 +11,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::config::DsmConfig;
 use crate::error::{DsmError, DsmSetting};
-use crate::images::character::ImageCharacter;
 use crate::images::image_pixels::read_view;
 use crate::images::order::{as_given, in_order_of};
+use crate::images::radiometry::ImageRadiometry;
 use crate::images::scene_image::SceneImage;
 use crate::masks::ground_mask::warn_of_masks;
 use crate::memory;
@@ -44,7 +44,7 @@ pub struct Plan {
     /// Images with corrected cameras.
     pub images: Vec<SceneImage>,
     /// Noise and contrast of the images.
-    pub characters: Vec<ImageCharacter>,
+    pub radiometry: Vec<ImageRadiometry>,
     /// Grid of the DSM.
     pub grid: DsmGrid,
     /// Pairs that see the same ground from different directions, the best angles first.
@@ -158,7 +158,7 @@ pub fn plan(config: &DsmConfig, pointed: &Pointed, session: &mut Session<'_>) ->
         version: env!("CARGO_PKG_VERSION").to_owned(),
         config: given.clone(),
         images: images.clone(),
-        characters: pointed.characters.clone(),
+        radiometry: pointed.radiometry.clone(),
         useful: pointed.useful.clone(),
         pixel_m,
         step_m: scene.step_m,
@@ -237,7 +237,7 @@ impl PlannedScene<'_> {
             None => {
                 let images = &self.pointed.images;
                 let windows: Vec<_> = images.iter().map(|image| Some(image.whole())).collect();
-                read_chunk_views(images, &self.pointed.characters, &windows, read_view)?
+                read_chunk_views(images, &self.pointed.radiometry, &windows, read_view)?
             }
         };
         let sweep = SceneSweep::new(range, self.step_m, SweepLevels::only(0), self.sources.to_vec(), self.tuning);
@@ -265,7 +265,7 @@ impl PlannedScene<'_> {
             config,
             tuning: self.tuning,
             images: &self.pointed.images,
-            characters: &self.pointed.characters,
+            radiometry: &self.pointed.radiometry,
             grid: self.grid,
             projection: &self.grid.projection()?,
             candidates: source_candidates(config, self.geometry, self.pointed, self.tuning),

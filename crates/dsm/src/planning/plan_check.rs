@@ -19,10 +19,10 @@ use reconstruct::{
 };
 
 use crate::error::DsmError;
-use crate::images::character::ImageCharacter;
 use crate::images::image_windows::GroundBox;
 use crate::images::open::Opened;
 use crate::images::order::sort_by_content;
+use crate::images::radiometry::ImageRadiometry;
 use crate::images::scene_image::SceneImage;
 use crate::memory;
 use crate::planning::chunk_plan::{ChunkSweep, ChunkWork};
@@ -124,7 +124,7 @@ impl Plan {
     fn check_images(&self) -> Checked {
         let n = self.images.len();
         ensure_count("images", n, self.config.images.len())?;
-        ensure_count("images with noise and contrast", self.characters.len(), n)?;
+        ensure_count("images with noise and contrast", self.radiometry.len(), n)?;
         let mut given = vec![false; n];
         for image in &self.images {
             let is_first = given.get_mut(image.number).is_some_and(|given| !std::mem::replace(given, true));
@@ -139,7 +139,7 @@ impl Plan {
         let mut sorted = self.images.clone();
         sort_by_content(&mut sorted);
         ensure(sorted == self.images, || "its images are not in the order of their content".to_owned())?;
-        self.characters.iter().try_for_each(ImageCharacter::check)?;
+        self.radiometry.iter().try_for_each(ImageRadiometry::check)?;
         let different: BTreeSet<&ImagePair> = self.useful.iter().collect();
         ensure_count("useful pairs", self.useful.len(), different.len())?;
         self.useful.iter().try_for_each(|pair| {
@@ -242,7 +242,7 @@ fn check_correction(correction: &ImageCorrection) -> Checked {
     ensure(is_small, || format!("the correction of the pointing is that of another image ({correction:?})"))
 }
 
-impl ImageCharacter {
+impl ImageRadiometry {
     fn check(&self) -> Checked {
         let levels = self.contrast.len();
         ensure(levels <= PYRAMID_LEVELS_MAX, || {

@@ -2,7 +2,7 @@
 
 pub(super) mod evidence;
 pub(super) mod image_checks;
-pub(super) mod look;
+pub(super) mod match_images;
 pub(super) mod other_fits;
 pub(super) mod pair_heights;
 pub(super) mod partners;

@@ -9,7 +9,7 @@ use sweep::pointing::{AdjustConfig, Adjustment, Track, adjust};
 
 use crate::images::scene_image::SceneImage;
 use crate::notes::Notes;
-use crate::pointing::look::FirstLook;
+use crate::pointing::match_images::MatchedImages;
 use crate::pointing::ties::{PairTies, TIES_MIN, join_pairs};
 
 /// Ties that fit as well as this need no other explanation, pixels: half of what ties leave on good
@@ -37,18 +37,18 @@ enum Other {
 ///
 /// The ties are taken as they were found. Those on which the views agree under the given RPCs were
 /// chosen to fit these.
-pub(crate) fn warn_of_other_fits(images: &[SceneImage], looked: &FirstLook, notes: &mut Notes<'_>) {
+pub(crate) fn warn_of_other_fits(images: &[SceneImage], matched: &MatchedImages, notes: &mut Notes<'_>) {
     let as_found = |found: &PairTies| PairTies::new(found.pair, found.as_found().to_vec());
-    let pairs: Vec<PairTies> = looked.ties.iter().map(as_found).collect();
+    let pairs: Vec<PairTies> = matched.ties.iter().map(as_found).collect();
     let tracks = &join_pairs(&pairs).0;
-    let found = adjust(&looked.cameras, &looked.sizes, tracks, &AdjustConfig::default());
+    let found = adjust(&matched.cameras, &matched.sizes, tracks, &AdjustConfig::default());
     let given_px = found.residual_px.1;
     if tracks.len() < TIES_MIN || given_px.is_nan() || given_px <= FITS_PX {
         return;
     }
     let given = found.ground.iter().flatten().count();
     let fits = others(images.len()).into_iter().filter_map(|other| {
-        let fit = fit(&other, looked, tracks);
+        let fit = fit(&other, matched, tracks);
         let kept = fit.ground.iter().flatten().count();
         let is_better = fit.residual_px.1 <= BETTER * given_px && kept as f64 >= KEPT * given as f64;
         is_better.then_some((fit.residual_px.1, other))
@@ -111,13 +111,13 @@ fn orders(count: usize) -> Vec<Vec<usize>> {
 }
 
 /// Adjusts the pointing under another assignment.
-fn fit(other: &Other, looked: &FirstLook, tracks: &[Track]) -> Adjustment {
+fn fit(other: &Other, matched: &MatchedImages, tracks: &[Track]) -> Adjustment {
     let config = AdjustConfig::default();
     match other {
-        Other::Mirrored => adjust(&looked.cameras, &looked.sizes, &mirrored(tracks, &looked.sizes), &config),
+        Other::Mirrored => adjust(&matched.cameras, &matched.sizes, &mirrored(tracks, &matched.sizes), &config),
         Other::Exchanged(rpcs) => {
-            let cameras: Vec<RpcCamera> = rpcs.iter().map(|from| looked.cameras[*from].clone()).collect();
-            adjust(&cameras, &looked.sizes, tracks, &config)
+            let cameras: Vec<RpcCamera> = rpcs.iter().map(|from| matched.cameras[*from].clone()).collect();
+            adjust(&cameras, &matched.sizes, tracks, &config)
         }
     }
 }

@@ -10,16 +10,16 @@ use sweep::pointing::{AdjustConfig, Adjustment, ModelOrder, Track, adjust};
 use crate::config::DsmConfig;
 use crate::error::DsmError;
 use crate::georeferencing::control::{Controlled, GroundControl};
-use crate::images::character::ImageCharacter;
 use crate::images::image_mask::note_masks;
 use crate::images::open::Opened;
 use crate::images::order::{as_given, in_order_of};
+use crate::images::radiometry::ImageRadiometry;
 use crate::images::scene_image::SceneImage;
 use crate::notes::{LISTED_MAX, Notes};
 use crate::planning::dem::dem_heights;
 use crate::pointing::evidence::warn_of_domains;
 use crate::pointing::image_checks::{grossly_off, unconnected};
-use crate::pointing::look::{FirstLook, asked_pairs, look, pair_names};
+use crate::pointing::match_images::{MatchedImages, asked_pairs, match_images, pair_names};
 use crate::pointing::other_fits::warn_of_other_fits;
 use crate::pointing::pair_heights::{PairHeights, off_along_sight};
 use crate::pointing::partners::ALL_MAX;
@@ -44,7 +44,7 @@ pub struct Pointed {
     /// Images with corrected cameras.
     pub images: Vec<SceneImage>,
     /// Noise and contrast of the images.
-    pub characters: Vec<ImageCharacter>,
+    pub radiometry: Vec<ImageRadiometry>,
     /// Whether the scene fits the memory and is computed at once.
     pub is_whole: bool,
     /// Pairs that see the same ground from different directions, the best angles first.
@@ -88,36 +88,36 @@ pub fn point(config: &DsmConfig, opened: &Opened, session: &mut Session<'_>) -> 
     }
     let mut notes = Notes::new(session.progress);
     note_masks(&images, &mut notes)?;
-    let looked = look(config, &images, session)?;
-    check_pictures(&images, &looked, session.views.as_deref())?;
+    let matched = match_images(config, &images, session)?;
+    check_pictures(&images, &matched, session.views.as_deref())?;
     let mut points = GroundControl::read(config.control.as_deref(), &images, &mut notes)?;
-    let (tracks, contradictory) = join_pairs(&looked.ties);
+    let (tracks, contradictory) = join_pairs(&matched.ties);
     // What control points do to an image is no fault of its RPC, which ties alone can tell.
-    let Controlled { found, by_ties } = points.adjust(&looked.cameras, &looked.sizes, &tracks, &mut notes)?;
+    let Controlled { found, by_ties } = points.adjust(&matched.cameras, &matched.sizes, &tracks, &mut notes)?;
     let is_applied = is_applied(config, &found, &by_ties, &mut notes)?;
-    warn_of_sights(&images, &looked, (&tracks, &by_ties), &mut notes);
-    warn_of_other_fits(&images, &looked, &mut notes);
-    let by_image = by_image(&images, &looked, &found, &tracks);
+    warn_of_sights(&images, &matched, (&tracks, &by_ties), &mut notes);
+    warn_of_other_fits(&images, &matched, &mut notes);
+    let by_image = by_image(&images, &matched, &found, &tracks);
     if is_applied {
         warn_of_images(&by_image, &mut notes);
         warn_of_residual(found.residual_px.1, &by_image, &mut notes);
         correct_cameras(&mut images, session, &found.corrections);
     }
     let mut pointing = PointingReport::new(&found, (tracks.len(), contradictory), is_applied, by_image);
-    pointing.control = points.report(&images, &looked.cameras, (&found, is_applied), &mut notes);
-    let FirstLook { geometry, mut useful, ties, characters, is_whole, .. } = looked;
+    pointing.control = points.report(&images, &matched.cameras, (&found, is_applied), &mut notes);
+    let MatchedImages { geometry, mut useful, ties, radiometry, is_whole, .. } = matched;
     if is_applied {
         drop_unconnected(config, &mut useful, &ties, &mut notes);
     }
-    let matched: Vec<ImagePair> = ties.iter().map(|t| t.pair.ordered()).collect();
-    let sought: Vec<ImagePair> = useful.iter().copied().filter(|pair| matched.contains(pair)).collect();
+    let tied: Vec<ImagePair> = ties.iter().map(|t| t.pair.ordered()).collect();
+    let sought: Vec<ImagePair> = useful.iter().copied().filter(|pair| tied.contains(pair)).collect();
     let pairs = choose_pairs(config, &images, &sought, &geometry, &mut notes)?;
     session.lap("pointing");
     let dem_heights =
         config.dem.as_deref().map(|path| dem_heights(path, config.dem_vertical, &geometry, &mut notes)).transpose()?;
     Ok(Pointed {
         images,
-        characters,
+        radiometry,
         is_whole,
         useful,
         pairs,
@@ -133,15 +133,15 @@ pub fn point(config: &DsmConfig, opened: &Opened, session: &mut Session<'_>) -> 
 }
 
 /// Refuses images without contrast, and one picture under two RPCs.
-fn check_pictures(images: &[SceneImage], looked: &FirstLook, views: Option<&[SweepView]>) -> Result<(), DsmError> {
+fn check_pictures(images: &[SceneImage], matched: &MatchedImages, views: Option<&[SweepView]>) -> Result<(), DsmError> {
     let path = |i: usize| images[i].path.clone();
-    let blank = looked.characters.iter().position(ImageCharacter::is_blank);
-    let pictures = looked.characters.iter().filter(|c| !c.is_blank()).count();
+    let blank = matched.radiometry.iter().position(ImageRadiometry::is_blank);
+    let pictures = matched.radiometry.iter().filter(|c| !c.is_blank()).count();
     if let (Some(first), true) = (blank, pictures < 2) {
         return Err(DsmError::Blank { path: path(first) });
     }
-    match at_one_shift(&looked.ties)
-        .map_or_else(|| same_picture(images, &looked.geometry, views), |pair| Ok(Some(pair)))?
+    match at_one_shift(&matched.ties)
+        .map_or_else(|| same_picture(images, &matched.geometry, views), |pair| Ok(Some(pair)))?
     {
         Some(pair) => Err(DsmError::SamePixels { first: path(pair.first), second: path(pair.second) }),
         None => Ok(()),
@@ -192,23 +192,23 @@ fn is_applied(
 /// a height.
 fn warn_of_sights(
     images: &[SceneImage],
-    looked: &FirstLook,
+    matched: &MatchedImages,
     (tracks, found): (&[Track], &Adjustment),
     notes: &mut Notes<'_>,
 ) {
     let as_given = AdjustConfig { max_order: ModelOrder::None, ..AdjustConfig::default() };
     let heights = |ties: &PairTies| {
         let pair = ties.pair;
-        let geometry = looked.geometry.pair(pair).filter(|_| ties.ties.len() >= TIES_MIN)?;
+        let geometry = matched.geometry.pair(pair).filter(|_| ties.ties.len() >= TIES_MIN)?;
         let of_pair = |track: &Track| -> Track { track.iter().filter(|(view, _)| pair.has(*view)).copied().collect() };
         let seen = tracks.iter().map(of_pair).enumerate().filter(|(_, track)| track.len() == 2);
         let (numbers, seen): (Vec<usize>, Vec<Track>) = seen.unzip();
-        let ground = adjust(&looked.cameras, &looked.sizes, &seen, &as_given).ground;
+        let ground = adjust(&matched.cameras, &matched.sizes, &seen, &as_given).ground;
         let heights = numbers.into_iter().zip(ground).filter_map(|(track, ground)| Some((track, ground?.height_m)));
         let views = [pair.first, pair.second];
         Some(PairHeights { views, height_m: heights.collect(), px_per_m: geometry.parallax_px_per_m })
     };
-    let pairs: Vec<PairHeights> = looked.ties.iter().filter_map(heights).collect();
+    let pairs: Vec<PairHeights> = matched.ties.iter().filter_map(heights).collect();
     let correction_px = |view: usize| {
         let [sample, line] = found.corrections[view].translation_px;
         sample.hypot(line)

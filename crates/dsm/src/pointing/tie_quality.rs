@@ -11,7 +11,7 @@ use sweep::pointing::{Adjustment, Track};
 
 use crate::images::scene_image::SceneImage;
 use crate::notes::Notes;
-use crate::pointing::look::FirstLook;
+use crate::pointing::match_images::MatchedImages;
 use crate::pointing::ties::TIES_MIN;
 use crate::report::ImagePointing;
 
@@ -34,7 +34,7 @@ const SHOWN_MAX: usize = 150;
 /// Returns what the ties show of each image, in the order of the configuration.
 pub(crate) fn by_image(
     images: &[SceneImage],
-    looked: &FirstLook,
+    matched: &MatchedImages,
     found: &Adjustment,
     tracks: &[Track],
 ) -> Vec<ImagePointing> {
@@ -45,7 +45,7 @@ pub(crate) fn by_image(
         let place = |track: &Track| track.iter().find(|(v, _)| *v == view).map(|(_, place)| *place);
         let inliers = tracks.iter().zip(&found.ground).filter(|(_, ground)| ground.is_some());
         let inliers: Vec<ImagePoint> = inliers.filter_map(|(track, _)| place(track)).collect();
-        let covered = height_m.and_then(|h| covered(&looked.cameras, &looked.sizes, view, &inliers, h));
+        let covered = height_m.and_then(|h| covered(&matched.cameras, &matched.sizes, view, &inliers, h));
         all.push((
             image.number,
             ImagePointing {
@@ -54,7 +54,7 @@ pub(crate) fn by_image(
                 inliers: inliers.len(),
                 covered: covered.unwrap_or(f64::NAN),
                 residual_px: found.view_residual_px[view],
-                tie_residuals_px: tie_residuals(&looked.cameras[view], view, found, tracks),
+                tie_residuals_px: tie_residuals(&matched.cameras[view], view, found, tracks),
             },
         ));
     }

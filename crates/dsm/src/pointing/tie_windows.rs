@@ -1,4 +1,4 @@
-//! Tie points and image characters of a scene that is too large to be read at once.
+//! Tie points and image radiometry of a scene that is too large to be read at once.
 //!
 //! Ties are searched for in windows of the ground, spread evenly over the scene. Each window is
 //! read at full resolution and dropped. The windows also give the noise and contrast of each image,
@@ -18,9 +18,9 @@ use sweep::SweepView;
 use sweep::pointing::{Tie, TieConfig};
 
 use crate::error::DsmError;
-use crate::images::character::ImageCharacter;
 use crate::images::image_pixels::read_view;
 use crate::images::image_windows::GroundBox;
+use crate::images::radiometry::ImageRadiometry;
 use crate::images::scene_image::SceneImage;
 use crate::planning::chunk_side::cores;
 use crate::pointing::evidence::is_beyond_chance;
@@ -67,7 +67,7 @@ struct Place {
     pairs: Vec<ImagePair>,
 }
 
-/// Returns the ties of the pairs, given best first, over heights in `search`, and the characters of
+/// Returns the ties of the pairs, given best first, over heights in `search`, and the radiometry of
 /// the images.
 ///
 /// # Errors
@@ -80,7 +80,7 @@ pub(crate) fn match_in_windows(
     pairs: &[ImagePair],
     search: HeightRange,
     progress: &dyn Progress,
-) -> Result<(Vec<PairTies>, Vec<ImageCharacter>), DsmError> {
+) -> Result<(Vec<PairTies>, Vec<ImageRadiometry>), DsmError> {
     let projection = grid.projection()?;
     let all = TieConfig::default();
     let (places, points, least) = if pairs.len() <= ALL_MAX {
@@ -91,7 +91,7 @@ pub(crate) fn match_in_windows(
         (places_of_pairs(grid, &projection, geometry, pairs)?, all.points / PLACES_PER_PAIR, FEWEST)
     };
     let config = TieConfig { points, ..all };
-    let mut characters = vec![ImageCharacter::default(); images.len()];
+    let mut radiometry = vec![ImageRadiometry::default(); images.len()];
     let mut out: Vec<PairTies> = pairs.iter().map(|&pair| PairTies::new(pair, Vec::new())).collect();
     let mut range = search;
     progress.begin("matching tie points", places.len());
@@ -102,7 +102,7 @@ pub(crate) fn match_in_windows(
         windows.iter_mut().enumerate().filter(|(i, _)| !is_matched(*i)).for_each(|(_, window)| *window = None);
         let views = read_parts(images, &windows)?;
         let is_there = |i: usize| windows[i].is_some();
-        (0..images.len()).filter(|&i| is_there(i)).for_each(|i| characters[i].learn(&views[i]));
+        (0..images.len()).filter(|&i| is_there(i)).for_each(|i| radiometry[i].add_window(&views[i]));
         let here: Vec<ImagePair> =
             place.pairs.into_iter().filter(|p| is_there(p.first) && is_there(p.second)).collect();
         let found = match_pairs(&views, &here, range, (&config, least), &|| ());
@@ -128,7 +128,7 @@ pub(crate) fn match_in_windows(
             *pair = PairTies::new(pair.pair, Vec::new());
         }
     }
-    Ok((out, characters))
+    Ok((out, radiometry))
 }
 
 /// Reads one window per image. An image without a window gives an absent view.

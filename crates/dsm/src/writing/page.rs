@@ -208,7 +208,7 @@ fn facts(report: &DsmReport) -> Vec<(String, String)> {
                 pointing.tracks, pointing.inliers, pointing.residual_before_px, pointing.residual_after_px
             ),
         ),
-        ("speckle removed".to_owned(), format!("{} cells", report.surface.speckle_removed)),
+        ("speckle removed".to_owned(), format!("{} cells", report.surface.counts.speckle_removed)),
     ];
     if let Some(control) = &pointing.control {
         let error = |value: Option<f64>| value.map_or("–".to_owned(), |v| format!("{v:.2} m"));

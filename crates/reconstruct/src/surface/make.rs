@@ -71,24 +71,32 @@ pub struct SurfaceInput<'a> {
     pub mask: Option<&'a GroundMask>,
 }
 
+/// Counts of cells.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct CellCounts {
+    /// Number of cells with an observed height.
+    pub observed: usize,
+    /// Number of cells filled from their surroundings.
+    pub filled: usize,
+    /// Number of cells without a height.
+    pub void: usize,
+    /// Number of those of them that lie under a mask or outside the area.
+    #[serde(default)]
+    pub masked: usize,
+    /// Number of filled cells between roofs, in quarters of which hardly any ground is known: they
+    /// have the ground there as far as it is known, or that under the lowest heights around.
+    #[serde(default)]
+    pub streets: usize,
+    /// Number of cells removed as speckle.
+    pub speckle_removed: usize,
+}
+
 /// Counts of cells and pixels.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SurfaceCounts {
-    /// Cells with an observed height.
-    pub observed: usize,
-    /// Cells filled from their surroundings.
-    pub filled: usize,
-    /// Cells without a height.
-    pub void: usize,
-    /// Those of them that lie under a mask or outside the area.
-    #[serde(default)]
-    pub masked: usize,
-    /// Filled cells between roofs, in quarters of which hardly any ground is known.
-    #[serde(default)]
-    pub streets: usize,
-    /// Cells removed as speckle.
-    pub speckle_removed: usize,
+    /// Cells of the surface.
+    pub cells: CellCounts,
     /// Pixels by view; no pixels for a view without heights of its own.
     pub views: Vec<KeptPixels>,
 }
@@ -106,8 +114,8 @@ pub struct KeptPixels {
     pub shadows: ShadowCounts,
 }
 
-impl SurfaceCounts {
-    /// Counts the cells of rasters.
+impl CellCounts {
+    /// Counts the cells of rasters. What was removed from them is not known.
     pub fn of(rasters: &SurfaceRasters) -> Self {
         let count = |grid: &Grid<u8>, value: u8| grid.data().iter().filter(|v| **v == value).count();
         Self {
@@ -117,18 +125,23 @@ impl SurfaceCounts {
             masked: count(&rasters.source, CellSource::Masked.code()),
             streets: count(&rasters.source, CellSource::FilledStreet.code()),
             speckle_removed: 0,
-            views: Vec::new(),
         }
     }
 
-    /// Adds the counts of another part of the same scene.
-    pub fn add(&mut self, other: &Self) {
+    fn add(&mut self, other: &Self) {
         self.observed += other.observed;
         self.filled += other.filled;
         self.void += other.void;
         self.masked += other.masked;
         self.streets += other.streets;
         self.speckle_removed = self.speckle_removed.saturating_add(other.speckle_removed);
+    }
+}
+
+impl SurfaceCounts {
+    /// Adds the counts of another part of the same scene.
+    pub fn add(&mut self, other: &Self) {
+        self.cells.add(&other.cells);
         self.views.resize(self.views.len().max(other.views.len()), KeptPixels::default());
         for (own, theirs) in self.views.iter_mut().zip(&other.views) {
             own.kept = own.kept.saturating_add(theirs.kept);
@@ -205,9 +218,9 @@ pub fn make_surface(
         }
     }
     drop(lattices);
-    let (rasters, counts) = fuse(input, placed, &blind, &pixels, origin_m)?;
+    let (rasters, cells) = fuse(input, placed, &blind, &pixels, origin_m)?;
     progress.step();
-    Ok((rasters, SurfaceCounts { views: kept, ..counts }))
+    Ok((rasters, SurfaceCounts { cells, views: kept }))
 }
 
 fn fuse(
@@ -216,7 +229,7 @@ fn fuse(
     blind: &Grid<bool>,
     pixels: &[ViewPixels],
     origin_m: f64,
-) -> Result<(SurfaceRasters, SurfaceCounts), ReconstructError> {
+) -> Result<(SurfaceRasters, CellCounts), ReconstructError> {
     let SurfaceInput { options, sweep, grid, core, mask, .. } = input;
     // Heights and their places are as coarse as the level that they come from.
     let coarser = f64::from(1u32 << sweep.levels.finest);
@@ -247,8 +260,8 @@ fn fuse(
         }
     }
     let rasters = SurfaceRasters::new(fused, &source, origin_m).cropped(core);
-    let counts = SurfaceCounts { speckle_removed, ..SurfaceCounts::of(&rasters) };
-    Ok((rasters, counts))
+    let cells = CellCounts { speckle_removed, ..CellCounts::of(&rasters) };
+    Ok((rasters, cells))
 }
 
 /// Marks the pixels that show no height: blank ones, and those whose best height lies outside the

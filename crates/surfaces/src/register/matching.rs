@@ -246,7 +246,7 @@ fn displacement(chips: &[Grid<f32>], picture: &Grid<f32>, reach_px: f64, config:
     let middle = |picture: &Grid<f32>| [picture.width(), picture.height()].map(|side| (side / 2) as f64);
     let expected = middle(picture);
     let search = ChipSearch { image: picture, expected, reach_px, image_from_chip: [[1.0, 0.0], [0.0, 1.0]] };
-    let find = |chip: &Grid<f32>| find_chip(Chip { picture: chip, point: middle(chip) }, &search, config).ok();
+    let find = |chip: &Grid<f32>| find_chip(Chip { image: chip, point: middle(chip) }, &search, config).ok();
     let places: Vec<ChipPlace> = chips.iter().filter_map(find).collect();
     let place = common(&places)?;
     Some([0, 1].map(|axis| place[axis] - expected[axis]))

@@ -1,6 +1,6 @@
-//! The graded census of pictures, and the cost of two of them: the inner loops of the cost volume.
+//! The graded census of images, and the cost of two of them: the inner loops of the cost volume.
 //!
-//! Pictures and everything made from them are rows without gaps, so that a register may run across
+//! Images and everything made from them are rows without gaps, so that a register may run across
 //! the end of a row. The results in the first and last rows and columns, which lack a neighbour,
 //! are meaningless; parts of tiles have a margin for them.
 
@@ -35,13 +35,13 @@ fn bytes_mut(chunks: &mut [Chunk]) -> &mut [u8] {
     unsafe { std::slice::from_raw_parts_mut(chunks.as_mut_ptr().cast(), chunks.len() * CHUNK) }
 }
 
-/// Returns how many values must follow a picture of `width` columns, so that its neighbours can be
+/// Returns how many values must follow an image of `width` columns, so that its neighbours can be
 /// read in whole registers.
 pub(crate) fn overhang(width: usize) -> usize {
     width + 1 + CHUNK
 }
 
-/// The graded census of a picture: for every pixel four of the differences to its neighbours, as
+/// The graded census of an image: for every pixel four of the differences to its neighbours, as
 /// bytes.
 ///
 /// The differences are: right − own, below − own, below right − own, and below − right. The other
@@ -50,29 +50,29 @@ pub(crate) fn overhang(width: usize) -> usize {
 pub(crate) struct Census {
     /// Differences cut at ±128, plus 128. The order of the bytes within 64 is that of the pixels,
     /// or the one in which registers pack them ([`Wide::in_order`]); it is the same for all
-    /// pictures.
+    /// images.
     grades: [Chunks; 4],
 }
 
-/// Scratch buffers for the cost of two pictures.
+/// Scratch buffers for the cost of two images.
 #[derive(Default)]
 pub(crate) struct CensusScratch {
-    /// Census of a picture that came without one.
+    /// Census of an image that came without one.
     graded: Census,
     /// Absolute differences of grades, after room for a row and a pixel.
     differences: [Chunks; 4],
 }
 
 impl Census {
-    /// Grades the first `area` values of a picture of `width` columns. [`overhang`] more must
+    /// Grades the first `area` values of an image of `width` columns. [`overhang`] more must
     /// follow.
     ///
     /// # Panics
-    /// Panics if the picture is shorter.
-    pub(crate) fn fill(&mut self, picture: &[i16], width: usize, area: usize) {
-        let picture = &picture[..area.next_multiple_of(CHUNK) + width + 1];
+    /// Panics if the image is shorter.
+    pub(crate) fn fill(&mut self, image: &[i16], width: usize, area: usize) {
+        let image = &image[..area.next_multiple_of(CHUNK) + width + 1];
         self.fit(area);
-        run_wide(Grade { picture, width, grades: &mut self.grades });
+        run_wide(Grade { image, width, grades: &mut self.grades });
     }
 
     fn fit(&mut self, area: usize) {
@@ -85,28 +85,28 @@ impl Census {
     }
 }
 
-/// Computes the cost of every pixel of two pictures of `width` columns.
+/// Computes the cost of every pixel of two images of `width` columns.
 ///
 /// The cost is the mean absolute difference of their census over the eight neighbours, cut at 128
 /// and scaled to 0 to 112. Whole chunks of `out` are written.
 ///
 /// # Panics
-/// Panics if the pictures differ in size or `out` is shorter.
+/// Panics if the images differ in size or `out` is shorter.
 pub(crate) fn census_cost(a: &Census, b: &Census, width: usize, scratch: &mut CensusScratch, out: &mut [u8]) {
     assert!(a.len() == b.len() && out.len() >= a.len(), "{} and {} grades for {} costs", a.len(), b.len(), out.len());
     scratch.fit(width, b);
     run_wide(CompareCensus { a, b, width, differences: &mut scratch.differences, out });
 }
 
-/// Computes [`census_cost`] of a picture that is not graded yet. [`overhang`] more values must
+/// Computes [`census_cost`] of an image that is not graded yet. [`overhang`] more values must
 /// follow it.
 ///
 /// # Panics
-/// Panics if the picture or `out` is shorter than `b`.
-pub(crate) fn picture_cost(picture: &[i16], b: &Census, width: usize, scratch: &mut CensusScratch, out: &mut [u8]) {
-    assert!(picture.len() > b.len() + width && out.len() >= b.len(), "{} values of {}", picture.len(), b.len());
+/// Panics if the image or `out` is shorter than `b`.
+pub(crate) fn image_cost(image: &[i16], b: &Census, width: usize, scratch: &mut CensusScratch, out: &mut [u8]) {
+    assert!(image.len() > b.len() + width && out.len() >= b.len(), "{} values of {}", image.len(), b.len());
     scratch.fit(width, b);
-    run_wide(ComparePicture { picture, b, width, scratch, out });
+    run_wide(CompareImage { image, b, width, scratch, out });
 }
 
 impl CensusScratch {
@@ -116,9 +116,9 @@ impl CensusScratch {
     }
 }
 
-/// Grades a picture, which has a row, a pixel and at least as many values as there are grades.
+/// Grades an image, which has a row, a pixel and at least as many values as there are grades.
 struct Grade<'a> {
-    picture: &'a [i16],
+    image: &'a [i16],
     width: usize,
     grades: &'a mut [Chunks; 4],
 }
@@ -126,15 +126,15 @@ struct Grade<'a> {
 impl WideKernel for Grade<'_> {
     #[inline(always)]
     fn run<V: Wide>(self, token: V::Token) {
-        registers::grade::<V>(token, self.picture, self.width, self.grades);
+        registers::grade::<V>(token, self.image, self.width, self.grades);
     }
 
     fn run_plain(self) {
-        plain::grade(self.picture, self.width, self.grades);
+        plain::grade(self.image, self.width, self.grades);
     }
 }
 
-/// Compares two pictures that are graded.
+/// Compares two images that are graded.
 struct CompareCensus<'a> {
     a: &'a Census,
     b: &'a Census,
@@ -154,26 +154,26 @@ impl WideKernel for CompareCensus<'_> {
     }
 }
 
-/// Compares a picture with one that is graded.
-struct ComparePicture<'a> {
-    picture: &'a [i16],
+/// Compares an image with one that is graded.
+struct CompareImage<'a> {
+    image: &'a [i16],
     b: &'a Census,
     width: usize,
     scratch: &'a mut CensusScratch,
     out: &'a mut [u8],
 }
 
-impl WideKernel for ComparePicture<'_> {
+impl WideKernel for CompareImage<'_> {
     #[inline(always)]
     fn run<V: Wide>(self, token: V::Token) {
-        registers::compare_picture::<V>(token, self);
+        registers::compare_image::<V>(token, self);
     }
 
     fn run_plain(self) {
-        let Self { picture, b, width, scratch, out } = self;
+        let Self { image, b, width, scratch, out } = self;
         let CensusScratch { graded, differences } = scratch;
         graded.fit(b.len());
-        plain::grade(picture, width, &mut graded.grades);
+        plain::grade(image, width, &mut graded.grades);
         plain::compare(CompareCensus { a: graded, b, width, differences, out });
     }
 }
@@ -182,12 +182,12 @@ impl WideKernel for ComparePicture<'_> {
 mod plain {
     use super::*;
 
-    pub(super) fn grade(picture: &[i16], width: usize, grades: &mut [Chunks; 4]) {
+    pub(super) fn grade(image: &[i16], width: usize, grades: &mut [Chunks; 4]) {
         let [right, below, falling, rising] = grades.each_mut().map(|g| bytes_mut(g));
-        codes(&picture[1..], picture, right);
-        codes(&picture[width..], picture, below);
-        codes(&picture[width + 1..], picture, falling);
-        codes(&picture[width..], &picture[1..], rising);
+        codes(&image[1..], image, right);
+        codes(&image[width..], image, below);
+        codes(&image[width + 1..], image, falling);
+        codes(&image[width..], &image[1..], rising);
     }
 
     /// Grades differences.
@@ -225,15 +225,15 @@ mod registers {
     const BAND: usize = 16;
 
     #[inline(always)]
-    pub(super) fn grade<V: Wide>(token: V::Token, picture: &[i16], width: usize, grades: &mut [Chunks; 4]) {
+    pub(super) fn grade<V: Wide>(token: V::Token, image: &[i16], width: usize, grades: &mut [Chunks; 4]) {
         let len = grades[0].len() * CHUNK;
-        assert!(picture.len() > len + width && grades.iter().all(|g| g.len() * CHUNK == len));
+        assert!(image.len() > len + width && grades.iter().all(|g| g.len() * CHUNK == len));
         for at in (0..len).step_by(V::BYTES) {
             // SAFETY: `at + V::BYTES` is at most `len`, a multiple of `CHUNK` and thus of
-            // `V::BYTES`. The picture has `width + 1` values more than that, as `grades_at` needs;
+            // `V::BYTES`. The image has `width + 1` values more than that, as `grades_at` needs;
             // each grade has `len`.
             unsafe {
-                let own = grades_at::<V>(token, picture.as_ptr().add(at), width);
+                let own = grades_at::<V>(token, image.as_ptr().add(at), width);
                 for (to, own) in grades.iter_mut().zip(own) {
                     own.store(start_mut(to).add(at));
                 }
@@ -251,13 +251,13 @@ mod registers {
     }
 
     #[inline(always)]
-    pub(super) fn compare_picture<V: Wide>(token: V::Token, pair: ComparePicture<'_>) {
-        let ComparePicture { picture, b, width, scratch, out } = pair;
-        assert!(picture.len() > b.len() + width);
+    pub(super) fn compare_image<V: Wide>(token: V::Token, pair: CompareImage<'_>) {
+        let CompareImage { image, b, width, scratch, out } = pair;
+        assert!(image.len() > b.len() + width);
         let own = |at: usize| {
-            // SAFETY: `compare` calls the closure with `at + V::BYTES <= b.len()`, and the picture
+            // SAFETY: `compare` calls the closure with `at + V::BYTES <= b.len()`, and the image
             // has `width + 1` values more than that, as `grades_at` needs.
-            unsafe { grades_at(token, picture.as_ptr().add(at), width) }
+            unsafe { grades_at(token, image.as_ptr().add(at), width) }
         };
         // SAFETY: the closure is safe to call with `at + V::BYTES <= b.len()`.
         unsafe { compare::<V>(token, own, b, width, &mut scratch.differences, out) }
@@ -389,30 +389,30 @@ mod tests {
     fn the_cost_is_the_mean_difference_to_eight_neighbours() {
         let (width, height) = if cfg!(miri) { (21, 9) } else { (37, 61) };
         let area = width * height;
-        let picture = |factor: usize| -> Vec<i16> {
+        let image = |factor: usize| -> Vec<i16> {
             (0..area + overhang(width)).map(|i| ((i * factor) % 331) as i16 / 2 - 80).collect()
         };
-        let (a, b) = (picture(9973), picture(7919));
+        let (a, b) = (image(9973), image(7919));
         let (mut census, mut other) = (Census::default(), Census::default());
         census.fill(&a, width, area);
         other.fill(&b, width, area);
         let mut scratch = CensusScratch::default();
         let mut costs = vec![vec![0; area.next_multiple_of(CHUNK)]; 3];
         census_cost(&census, &other, width, &mut scratch, &mut costs[0]);
-        picture_cost(&a, &other, width, &mut scratch, &mut costs[1]);
+        image_cost(&a, &other, width, &mut scratch, &mut costs[1]);
         let mut plain = [Census::default(), Census::default()];
-        for (plain, picture) in plain.iter_mut().zip([&a, &b]) {
+        for (plain, image) in plain.iter_mut().zip([&a, &b]) {
             plain.fit(area);
-            Grade { picture, width, grades: &mut plain.grades }.run_plain();
+            Grade { image, width, grades: &mut plain.grades }.run_plain();
         }
         let [own, other] = &plain;
         let (differences, out) = (&mut scratch.differences, &mut costs[2][..]);
         CompareCensus { a: own, b: other, width, differences, out }.run_plain();
         let mut graded = [Census::default(), Census::default()];
         let mut has_avx2 = true;
-        for (graded, picture) in graded.iter_mut().zip([&a, &b]) {
+        for (graded, image) in graded.iter_mut().zip([&a, &b]) {
             graded.fit(area);
-            has_avx2 &= run_with_avx2(Grade { picture, width, grades: &mut graded.grades });
+            has_avx2 &= run_with_avx2(Grade { image, width, grades: &mut graded.grades });
         }
         if has_avx2 {
             let [own, other] = &graded;
@@ -420,7 +420,7 @@ mod tests {
             let (differences, out) = (&mut scratch.differences, &mut further[0][..]);
             run_with_avx2(CompareCensus { a: own, b: other, width, differences, out });
             let (scratch, out) = (&mut scratch, &mut further[1][..]);
-            run_with_avx2(ComparePicture { picture: &a, b: other, width, scratch, out });
+            run_with_avx2(CompareImage { image: &a, b: other, width, scratch, out });
             costs.extend(further);
         }
         for y in 1..height - 1 {

@@ -119,7 +119,7 @@ fn blend_rows(costs: &mut [u8], width: usize, sums: &mut [u16], cut: impl Fn(u8)
 }
 
 /// Writes the weighted mean of each pixel's costs. An invalid cost counts as [`COST_MAX`], the cost
-/// of unrelated pictures, with weight 1; a valid one has weight [`VALID_WEIGHT`].
+/// of unrelated images, with weight 1; a valid one has weight [`VALID_WEIGHT`].
 ///
 /// `is_hidden` tells whether any cost is invalid. `sums` and `weights` are scratch buffers.
 pub(crate) fn mean_cost(costs: &[Vec<u8>], is_hidden: bool, sums: &mut [u16], weights: &mut [u16], out: &mut [u8]) {
@@ -223,7 +223,7 @@ mod tests {
         prop::collection::vec(-60.0..60.0f32, SIDE * SIDE)
     }
 
-    /// Patches that share most of their picture, so that no cost is cut.
+    /// Patches that share most of their image, so that no cost is cut.
     fn alike(n: usize) -> impl Strategy<Value = Vec<Vec<f32>>> {
         let own = prop::collection::vec(-20.0..20.0f32, SIDE * SIDE);
         (patch(), prop::collection::vec(own, n)).prop_map(|(common, own)| {

@@ -15,14 +15,13 @@
 //!
 //! Work goes by tiles of the reference. Each source is resampled over the tile once, through a
 //! local map (`geometry::LocalMap`); each height plane is then a sub-pixel shift of that
-//! picture. Pictures are 16-bit integers in which 128 is the difference that counts fully; features
+//! image. Images are 16-bit integers in which 128 is the difference that counts fully; features
 //! and costs are bytes.
 
 mod census;
 mod config;
 mod division;
 mod kernels;
-mod laid;
 mod part;
 mod planes;
 mod raise;
@@ -31,6 +30,7 @@ mod shift;
 mod tile;
 mod transpose;
 mod voids;
+mod warped;
 
 pub use config::{Aggregation, COST_MAX, CostConfig};
 pub(crate) use planes::BlockCosts;

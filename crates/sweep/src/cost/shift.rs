@@ -1,31 +1,31 @@
-//! A picture shifted by a sub-pixel vector: bicubic interpolation in 16-bit integers.
+//! An image shifted by a sub-pixel vector: bicubic interpolation in 16-bit integers.
 
 #![allow(unsafe_code)]
 
 use crate::simd::wide::Wide;
 use crate::simd::wide_kernel::{WideKernel, run_wide};
 
-/// A picture of `stride` columns, followed by [`OVERHANG`] values.
+/// An image of `stride` columns, followed by [`OVERHANG`] values.
 #[derive(Clone, Copy)]
-pub(crate) struct Picture<'a> {
+pub(crate) struct Image<'a> {
     /// Values, row after row.
     pub(crate) data: &'a [i16],
     /// Number of columns.
     pub(crate) stride: usize,
 }
 
-/// Values behind a picture and behind the result that may be read and overwritten: whole registers
+/// Values behind an image and behind the result that may be read and overwritten: whole registers
 /// are read and written.
 pub(crate) const OVERHANG: usize = 16;
 
-/// A shift of a window of a picture by one sub-pixel vector.
+/// A shift of a window of an image by one sub-pixel vector.
 ///
-/// `out[y][x] = Σ wy[j] wx[i] picture[y0 + y + j][x0 + x + i]` over `i` and `j` from 0 to 3.
+/// `out[y][x] = Σ wy[j] wx[i] image[y0 + y + j][x0 + x + i]` over `i` and `j` from 0 to 3.
 /// Weights are in 2¹⁵ths, and each product is rounded.
 pub(crate) struct BicubicShift<'a> {
-    /// The picture.
-    pub(crate) picture: Picture<'a>,
-    /// First column `x0` and row `y0` of the picture that the result takes.
+    /// The image.
+    pub(crate) image: Image<'a>,
+    /// First column `x0` and row `y0` of the image that the result takes.
     pub(crate) at: (usize, usize),
     /// Weights `wx` of four columns.
     pub(crate) column_weights: [i16; 4],
@@ -42,7 +42,7 @@ pub(crate) struct BicubicShift<'a> {
 /// Computes a shift.
 ///
 /// # Panics
-/// Panics if the picture or the result is too short.
+/// Panics if the image or the result is too short.
 pub(crate) fn shift_bicubic(shift: BicubicShift<'_>) {
     run_wide(shift);
 }
@@ -54,10 +54,10 @@ impl WideKernel for BicubicShift<'_> {
     }
 
     fn run_plain(self) {
-        let Self { picture, at: (x0, y0), column_weights, row_weights, size: (width, height), rows, out } = self;
+        let Self { image, at: (x0, y0), column_weights, row_weights, size: (width, height), rows, out } = self;
         rows.resize(width * (height + 3), 0);
         for (y, row) in rows.chunks_exact_mut(width).enumerate() {
-            weigh(&picture.data[(y0 + y) * picture.stride + x0..], 1, column_weights, row);
+            weigh(&image.data[(y0 + y) * image.stride + x0..], 1, column_weights, row);
         }
         weigh(rows, width, row_weights, &mut out[..width * height]);
     }
@@ -88,9 +88,9 @@ mod registers {
     /// writes more than [`OVERHANG`] values beyond the result.
     #[inline(always)]
     pub(super) fn shift<V: Wide>(token: V::Token, job: BicubicShift<'_>) {
-        let BicubicShift { picture, at: (x0, y0), column_weights, row_weights, size: (width, height), out, .. } = job;
-        let stride = picture.stride;
-        let from = &picture.data[y0 * stride + x0..][..(height + 2) * stride + width.next_multiple_of(OVERHANG) + 3];
+        let BicubicShift { image, at: (x0, y0), column_weights, row_weights, size: (width, height), out, .. } = job;
+        let stride = image.stride;
+        let from = &image.data[y0 * stride + x0..][..(height + 2) * stride + width.next_multiple_of(OVERHANG) + 3];
         let out = &mut out[..(height - 1) * width + width.next_multiple_of(OVERHANG)];
         let mut strips = Strips { from, stride, column_weights, row_weights, out, width, height };
         let columns = V::BYTES / 2;
@@ -181,7 +181,7 @@ mod tests {
     use crate::simd::wide_kernel::run_with_avx2;
 
     #[test]
-    fn a_shifted_picture_is_the_weighted_sum_of_sixteen_values() {
+    fn a_shifted_image_is_the_weighted_sum_of_sixteen_values() {
         // Whole registers of the longest kind, then half a register left over, less, and more.
         [64, 71, 53, 16, 21, 5].into_iter().for_each(shifted);
     }
@@ -191,23 +191,23 @@ mod tests {
         let data: Vec<i16> = (0..stride * 12 + OVERHANG as i32).map(|i| ((i * 977) % 16_001 - 8_000) as i16).collect();
         let (wx, wy) = ([-2048, 18_000, 19_000, -2184], [-1000, 30_000, 4_000, -232]);
         let at = |x: usize, y: usize| f64::from(data[y * stride as usize + x]);
-        let picture = Picture { data: &data, stride: stride as usize };
+        let image = Image { data: &data, stride: stride as usize };
         let (mut rows, mut out, mut plain) = (Vec::new(), vec![0; width * height + OVERHANG], vec![0; width * height]);
         fn job<'a>(
-            picture: Picture<'a>,
+            image: Image<'a>,
             weights: ([i16; 4], [i16; 4]),
             size: (usize, usize),
             rows: &'a mut Vec<i16>,
             out: &'a mut [i16],
         ) -> BicubicShift<'a> {
             let (column_weights, row_weights) = weights;
-            BicubicShift { picture, at: (4, 2), column_weights, row_weights, size, rows, out }
+            BicubicShift { image, at: (4, 2), column_weights, row_weights, size, rows, out }
         }
-        shift_bicubic(job(picture, (wx, wy), (width, height), &mut rows, &mut out));
-        job(picture, (wx, wy), (width, height), &mut rows, &mut plain).run_plain();
+        shift_bicubic(job(image, (wx, wy), (width, height), &mut rows, &mut out));
+        job(image, (wx, wy), (width, height), &mut rows, &mut plain).run_plain();
         assert_eq!(out[..plain.len()], plain);
         out.fill(0);
-        if run_with_avx2(job(picture, (wx, wy), (width, height), &mut rows, &mut out)) {
+        if run_with_avx2(job(image, (wx, wy), (width, height), &mut rows, &mut out)) {
             assert_eq!(out[..plain.len()], plain);
         }
         let rounded = |v: f64, w: i16| (v * f64::from(w) / 32_768.0 + 0.5).floor();

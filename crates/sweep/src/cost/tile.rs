@@ -6,11 +6,11 @@ use super::census::{CHUNK, Census, overhang};
 use super::config::{Aggregation, COST_MAX, CostConfig};
 use super::division::{SweptPart, TILE_MIN, divide, halves, plane_span};
 use super::kernels::{self, FULL, INVALID};
-use super::laid::{LaidSource, PlaneScratch};
 use super::part::{MARGIN, Part};
 use super::planes::{BlockCosts, PLANES_AT_ONCE, PlaneRun, Planes, scatter};
 use super::scale::census_scale;
 use super::voids::Voids;
+use super::warped::{PlaneScratch, WarpedSource};
 use crate::error::SweepError;
 use crate::geometry::{LocalMap, PixelBox, source_column_row};
 use crate::reference::Reference;
@@ -19,7 +19,7 @@ use crate::view::ViewLevel;
 /// Local maps are fitted between multiples of this many planes. A source is resampled at the middle
 /// of these heights, and the phase of the resampling changes costs. Two runs whose heights differ a
 /// little shall get the same costs, so that the middle must not follow every plane. More planes
-/// would make the resampled pictures larger.
+/// would make the resampled images larger.
 const PLANES_ALIGNED: i32 = 64;
 /// A range of this many planes or fewer is not divided further.
 const PLANES_MIN: i32 = 4;
@@ -31,10 +31,10 @@ pub(crate) struct TileScratch {
     reference: Census,
     reference_voids: Voids,
     /// Sources resampled over the tile.
-    sources: Vec<LaidSource>,
+    sources: Vec<WarpedSource>,
     /// Grey values before quantisation.
     grey: Vec<f32>,
-    /// Quantised picture of the reference over the part.
+    /// Quantised image of the reference over the part.
     padded: Vec<i16>,
     plane: PlaneScratch,
     /// Costs of one plane for each pair of views.
@@ -169,11 +169,11 @@ impl TileScratch {
         config: &CostConfig,
     ) {
         let padded = tile.grown(MARGIN);
-        self.sources.resize_with(sources.len(), LaidSource::default);
+        self.sources.resize_with(sources.len(), WarpedSource::default);
         let step = reference.ranges.step_m;
-        for ((laid, source), map) in self.sources.iter_mut().zip(sources).zip(maps) {
+        for ((warped, source), map) in self.sources.iter_mut().zip(sources).zip(maps) {
             let heights = (f64::from(planes.0) * step, f64::from(planes.1 - 1) * step);
-            laid.lay_over(source, *map, padded, heights, &mut self.grey);
+            warped.warp(source, *map, padded, heights, &mut self.grey);
         }
         let pairs = match config.aggregation {
             Aggregation::Variance => sources.len() * (sources.len() + 1) / 2,
@@ -245,14 +245,14 @@ impl TileScratch {
         let mut is_hidden = false;
         for i in 0..sources.len() {
             let (before, rest) = sources.split_at_mut(i);
-            let (Some(laid), Some(cost)) = (rest.first_mut(), costs.next()) else { continue };
-            laid.place(height_m, part, scratch);
-            is_hidden |= laid.cost(reference, part, INVALID, scratch, cost);
+            let (Some(warped), Some(cost)) = (rest.first_mut(), costs.next()) else { continue };
+            warped.place(height_m, part, scratch);
+            is_hidden |= warped.cost(reference, part, INVALID, scratch, cost);
             is_hidden |= reference_voids.hide((0, 0), part, INVALID, cost);
             if config.aggregation == Aggregation::Variance {
-                laid.grade(part, scratch);
+                warped.grade(part, scratch);
                 for (other, cost) in before.iter().zip(&mut costs) {
-                    is_hidden |= laid.cost_between(other, part, scratch, cost);
+                    is_hidden |= warped.cost_between(other, part, scratch, cost);
                 }
             }
         }

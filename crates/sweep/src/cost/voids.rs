@@ -1,4 +1,4 @@
-//! Where pictures have no value, and which costs that makes invalid.
+//! Where images have no value, and which costs that makes invalid.
 
 use multiversion::multiversion;
 
@@ -6,19 +6,19 @@ use super::kernels::INVALID;
 use super::part::{MARGIN, Part};
 use super::raise::{RaiseMarked, raise_marked};
 
-/// Marks of the places whose neighbourhood holds a void. There are none if the picture has no void.
+/// Marks of the places whose neighbourhood holds a void. There are none if the image has no void.
 #[derive(Default)]
 pub(super) struct Voids {
     /// [`INVALID`] at marked places, 0 elsewhere.
     marks: Vec<u8>,
-    /// Columns of the picture.
+    /// Columns of the image.
     stride: usize,
     /// Whether each row has a mark.
     rows: Vec<bool>,
 }
 
 impl Voids {
-    /// Marks every place of a picture of `stride` columns from which a square of `side` pixels to
+    /// Marks every place of an image of `stride` columns from which a square of `side` pixels to
     /// the right and below holds a NaN. `has_voids` tells whether there is one.
     pub(super) fn mark(&mut self, values: &[f32], stride: usize, side: usize, has_voids: bool) {
         self.marks.clear();

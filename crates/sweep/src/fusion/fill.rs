@@ -9,7 +9,7 @@
 //! - If the surface around lies under the bound, the cell is *hidden* from all but one view, and
 //!   gets this surface. If it lies above, two views would have seen it. A wide void then gets the
 //!   nearest surface under the bound: a street between towers is not filled with a roof.
-//! - Otherwise two views see the cell and their pictures do not match. A *narrow* void is closed. A
+//! - Otherwise two views see the cell and their images do not match. A *narrow* void is closed. A
 //!   wider one is completed where the known heights around it fit one plane, and where it lies
 //!   between two opposite heights. If the border near the cell has ground lower by a storey, the
 //!   cell gets the ground.

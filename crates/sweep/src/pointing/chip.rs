@@ -1,9 +1,9 @@
-//! Image chips: the surroundings of a ground point in a small picture are searched for in an image.
+//! Image chips: the surroundings of a ground point in a small image are searched for in an image.
 //!
 //! The image is resampled once in the frame of the chip, around the place where the camera expects
 //! the point. The zero-mean normalised cross-correlation of every place within the pointing error
 //! is computed, over the pixels that both show: NaN hides pixels on either side. A chip is as large
-//! as its picture reaches on all sides and at least half of it is clear. The best place must
+//! as its image reaches on all sides and at least half of it is clear. The best place must
 //! correlate well and lead over every other peak, because a wrong control point does more harm than
 //! none.
 //!
@@ -97,14 +97,14 @@ pub enum ChipMiss {
 /// [`ChipMiss`]: the reason for which no place is trusted.
 pub fn find_chip(chip: Chip<'_>, search: &ChipSearch<'_>, config: &ChipConfig) -> Result<ChipPlace, ChipMiss> {
     let (mut search, mut point) = (*search, chip.point);
-    let (mut picture, mut image) = (Cow::Borrowed(chip.picture), Cow::Borrowed(search.image));
+    let (mut small, mut image) = (Cow::Borrowed(chip.image), Cow::Borrowed(search.image));
     let mut halved = 0;
     if !SCALES.contains(&scale(&search)) {
         return Err(ChipMiss::Useless);
     }
     // The finer of both is brought to about the pixels of the other.
     while scale(&search) <= 0.5 {
-        picture = Cow::Owned(reduce(&picture));
+        small = Cow::Owned(reduce(&small));
         point = point.map(|v| level_from_level0(v, 1));
         search.image_from_chip = search.image_from_chip.map(|row| row.map(|v| 2.0 * v));
     }
@@ -115,7 +115,7 @@ pub fn find_chip(chip: Chip<'_>, search: &ChipSearch<'_>, config: &ChipConfig) -
         search.reach_px *= 0.5;
         halved += 1;
     }
-    let found = find(Chip { picture: &picture, point }, &ChipSearch { image: &image, ..search }, config)?;
+    let found = find(Chip { image: &small, point }, &ChipSearch { image: &image, ..search }, config)?;
     Ok(ChipPlace { place: found.place.map(|v| level0_from_level(v, halved)), ..found })
 }
 
@@ -128,10 +128,10 @@ fn scale(search: &ChipSearch<'_>) -> f64 {
 /// Finds a chip whose pixels are about as large as those of the image.
 fn find(chip: Chip<'_>, search: &ChipSearch<'_>, config: &ChipConfig) -> Result<ChipPlace, ChipMiss> {
     let reach = half_width(chip).filter(|reach| *reach >= config.radius_min).ok_or(ChipMiss::Useless)?;
-    let radius = clear_radius(chip.picture, chip.point, [config.radius_min, reach.min(config.radius_max)]);
+    let radius = clear_radius(chip.image, chip.point, [config.radius_min, reach.min(config.radius_max)]);
     let radius = radius.ok_or(ChipMiss::Useless)? as i32;
-    let own = MaskedPatch::around(chip.picture, chip.point, radius).ok_or(ChipMiss::Useless)?;
-    let whole = Patch::around(chip.picture, chip.point, radius, 0.0).filter(|_| own.is_whole());
+    let own = MaskedPatch::around(chip.image, chip.point, radius).ok_or(ChipMiss::Useless)?;
+    let whole = Patch::around(chip.image, chip.point, radius, 0.0).filter(|_| own.is_whole());
     let reach = (search.reach_px / scale(search)).ceil().max(2.0) as i32;
     let scores = correlations((&own, whole.as_ref()), radius, search, reach);
     let (side, data) = (scores.width(), scores.data());
@@ -159,7 +159,7 @@ fn find(chip: Chip<'_>, search: &ChipSearch<'_>, config: &ChipConfig) -> Result<
 
 /// Returns how far a chip reaches around its point on all sides, with a margin for resampling.
 fn half_width(chip: Chip<'_>) -> Option<usize> {
-    let (width, height) = (chip.picture.width() as f64, chip.picture.height() as f64);
+    let (width, height) = (chip.image.width() as f64, chip.image.height() as f64);
     let [x, y] = chip.point;
     let reach = x.min(width - 1.0 - x).min(y).min(height - 1.0 - y).floor() - 2.0;
     (reach >= 0.0).then_some(reach as usize)
@@ -181,17 +181,17 @@ fn correlations(
     let (patch, side) = (2 * radius as usize + 1, 2 * reach as usize + 1);
     let far = radius + reach;
     let length = 2 * far as usize + 1;
-    let mut picture = Grid::filled(length + padded(patch) - patch, length, f32::NAN);
+    let mut resampled = Grid::filled(length + padded(patch) - patch, length, f32::NAN);
     let [[a, _], [c, _]] = search.image_from_chip;
     for j in 0..length {
         let line = search.moved(search.expected, [-f64::from(far), j as f64 - f64::from(far)]);
-        bicubic_along(search.image, line, [a, c], &mut picture.row_mut(j)[..length]);
+        bicubic_along(search.image, line, [a, c], &mut resampled.row_mut(j)[..length]);
     }
-    remove_mean(picture.data_mut());
-    let is_clear = (0..length).all(|j| picture.row(j)[..length].iter().all(|v| v.is_finite()));
+    remove_mean(resampled.data_mut());
+    let is_clear = (0..length).all(|j| resampled.row(j)[..length].iter().all(|v| v.is_finite()));
     let scores = match whole.filter(|_| is_clear) {
-        Some(patch) => patch.correlations(picture, 0.0),
-        None => own.correlations(&picture),
+        Some(patch) => patch.correlations(resampled, 0.0),
+        None => own.correlations(&resampled),
     };
     scores.window(Window { x: 0, y: 0, width: side, height: side }, NO_PIXELS)
 }
@@ -213,7 +213,7 @@ mod tests {
             .sum()
     }
 
-    fn picture(width: usize, height: usize, value: impl Fn(f64, f64) -> f64) -> Grid<f32> {
+    fn raster(width: usize, height: usize, value: impl Fn(f64, f64) -> f64) -> Grid<f32> {
         let cells = (0..width * height).map(|i| value((i % width) as f64, (i / width) as f64) as f32).collect();
         Grid::from_vec(width, height, cells).unwrap()
     }
@@ -223,7 +223,7 @@ mod tests {
     /// The chip shows what the image shows, turned, stretched and with other grey values.
     fn chip() -> Grid<f32> {
         let [[a, b], [c, d]] = TURNED;
-        picture(41, 37, |x, y| {
+        raster(41, 37, |x, y| {
             let (i, j) = (x - 20.25, y - 18.5);
             300.0 + 0.4 * texture(101.3 + a * i + b * j, 88.6 + c * i + d * j)
         })
@@ -235,8 +235,8 @@ mod tests {
 
     #[test]
     fn a_chip_is_found_to_a_hundredth_of_a_pixel() {
-        let (image, chip) = (picture(200, 190, texture), chip());
-        let chip = Chip { picture: &chip, point: [20.25, 18.5] };
+        let (image, chip) = (raster(200, 190, texture), chip());
+        let chip = Chip { image: &chip, point: [20.25, 18.5] };
         let found = find_chip(chip, &search(&image), &ChipConfig::default()).unwrap();
         let [x, y] = found.place;
         assert!((x - 101.3).hypot(y - 88.6) < 0.01 && found.score > 0.99, "{found:?}");
@@ -246,10 +246,10 @@ mod tests {
     fn hidden_pixels_of_the_chip_and_of_the_image_do_not_count() {
         let hidden = |x: f64, y: f64| (x - 24.0).abs() < 4.0 && y > 15.0;
         let chip =
-            picture(41, 37, |x, y| if hidden(x, y) { f64::NAN } else { f64::from(chip()[(x as usize, y as usize)]) });
+            raster(41, 37, |x, y| if hidden(x, y) { f64::NAN } else { f64::from(chip()[(x as usize, y as usize)]) });
         let shadow = |x: f64, y: f64| x > 108.0 && y < 82.0;
-        let image = picture(200, 190, |x, y| if shadow(x, y) { f64::NAN } else { texture(x, y) });
-        let chip = Chip { picture: &chip, point: [20.25, 18.5] };
+        let image = raster(200, 190, |x, y| if shadow(x, y) { f64::NAN } else { texture(x, y) });
+        let chip = Chip { image: &chip, point: [20.25, 18.5] };
         let found = find_chip(chip, &search(&image), &ChipConfig::default()).unwrap();
         let [x, y] = found.place;
         assert!((x - 101.3).hypot(y - 88.6) < 0.02 && found.score > 0.98, "{found:?}");
@@ -257,9 +257,9 @@ mod tests {
 
     #[test]
     fn places_that_cannot_be_trusted_have_reasons() {
-        let (image, chip) = (picture(200, 190, texture), chip());
+        let (image, chip) = (raster(200, 190, texture), chip());
         let find = |chip: &Grid<f32>, point: [f64; 2], search: &ChipSearch<'_>| {
-            find_chip(Chip { picture: chip, point }, search, &ChipConfig::default()).unwrap_err()
+            find_chip(Chip { image: chip, point }, search, &ChipConfig::default()).unwrap_err()
         };
         let point = [20.25, 18.5];
         let near = search(&image);
@@ -272,7 +272,7 @@ mod tests {
         assert!(matches!(find(&chip, point, &short), ChipMiss::AtEdge { .. } | ChipMiss::Unlike { .. }));
         // Rows of houses repeat.
         let row = |x: f64, y: f64| texture(x.rem_euclid(14.0), y) + 0.01 * x;
-        let (houses, house) = (picture(200, 190, row), picture(41, 41, |x, y| row(x + 70.0, y + 70.0)));
+        let (houses, house) = (raster(200, 190, row), raster(41, 41, |x, y| row(x + 70.0, y + 70.0)));
         let straight = [[1.0, 0.0], [0.0, 1.0]];
         let along = ChipSearch { image: &houses, expected: [92.0, 91.0], reach_px: 20.0, image_from_chip: straight };
         assert!(matches!(find(&house, [20.0, 20.0], &along), ChipMiss::Ambiguous { .. }));

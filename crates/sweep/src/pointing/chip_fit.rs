@@ -18,11 +18,11 @@ const AWAY_PX: f64 = 2.0;
 /// Greatest entry of the affine map beyond identity. Steep ground in a wide pair stays below it.
 const STRETCH_MAX: f64 = 0.4;
 
-/// A picture of the surroundings of a ground point.
+/// An image of the surroundings of a ground point.
 #[derive(Debug, Clone, Copy)]
 pub struct Chip<'a> {
     /// Grey values; NaN where invalid.
-    pub picture: &'a Grid<f32>,
+    pub image: &'a Grid<f32>,
     /// Column and row of the point.
     pub point: [f64; 2],
 }
@@ -100,7 +100,7 @@ fn step(chip: Chip<'_>, search: &ChipSearch<'_>, start: [f64; 2], radius: i32, w
         for i in -radius..=radius {
             let at =
                 |di: i32, dj: i32| f64::from(seen[((i + di + radius + 1) as usize, (j + dj + radius + 1) as usize)]);
-            let own = f64::from(bicubic(chip.picture, chip.point[0] + f64::from(i), chip.point[1] + f64::from(j)));
+            let own = f64::from(bicubic(chip.image, chip.point[0] + f64::from(i), chip.point[1] + f64::from(j)));
             let (value, dx, dy) = (at(0, 0), 0.5 * (at(1, 0) - at(-1, 0)), 0.5 * (at(0, 1) - at(0, -1)));
             clear += usize::from(own.is_finite());
             if !(value + own + dx + dy).is_finite() {
@@ -117,7 +117,7 @@ fn step(chip: Chip<'_>, search: &ChipSearch<'_>, start: [f64; 2], radius: i32, w
         return None;
     }
     let found = normal.cholesky()?.solve(&right);
-    // A negative picture is another one.
+    // A negative image is another one.
     (found[6] > 0.0).then(|| std::array::from_fn(|k| found[k]))
 }
 

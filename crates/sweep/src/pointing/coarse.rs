@@ -15,10 +15,10 @@ use crate::view::QUANTISATION_VARIANCE;
 pub(crate) struct Coarse {
     /// Map from reference to source positions on the level.
     map: LocalMap,
-    /// Reference column and row of the picture's first pixel.
+    /// Reference column and row of the image's first pixel.
     origin: [i64; 2],
     /// The resampled source, 0 where invalid, with columns of zeros behind it that patches read.
-    picture: Grid<f32>,
+    image: Grid<f32>,
     /// `1 / deviation` of the patch whose first pixel is here; NaN where invalid or flat.
     inverse_deviation: Grid<f32>,
     /// Heights about a pixel of parallax apart, each with the offsets at which a patch may lie: on
@@ -46,12 +46,12 @@ impl Coarse {
         let band = (config.band_px / f64::from(1u32 << level)).ceil() as i32;
         let places = places(&map, range_m, band)?;
         let side = 2 * config.radius as usize + 1;
-        let (origin, mut picture) = lay_over(source, &map, padded(side) - side)?;
-        remove_mean(picture.data_mut());
-        let inverse_deviation = inverse_deviations(&picture, side, pair.source.noise_at(level), QUANTISATION_VARIANCE);
-        picture.data_mut().iter_mut().filter(|v| v.is_nan()).for_each(|v| *v = 0.0);
+        let (origin, mut image) = warped(source, &map, padded(side) - side)?;
+        remove_mean(image.data_mut());
+        let inverse_deviation = inverse_deviations(&image, side, pair.source.noise_at(level), QUANTISATION_VARIANCE);
+        image.data_mut().iter_mut().filter(|v| v.is_nan()).for_each(|v| *v = 0.0);
         let rows = rows(&places);
-        Some(Self { map, origin, picture, inverse_deviation, places, rows })
+        Some(Self { map, origin, image, inverse_deviation, places, rows })
     }
 
     /// Returns the height and source position of the best match of a patch around `p`, if it beats
@@ -78,12 +78,12 @@ impl Coarse {
         stands_out.then(|| (best.height_m, self.map.at(place, self.map.mid_height_m())))
     }
 
-    /// Computes the correlations of a patch around `p` with the picture: for each row of places the
-    /// first column offset and the correlations from there on. NaN outside the picture and on
+    /// Computes the correlations of a patch around `p` with the image: for each row of places the
+    /// first column offset and the correlations from there on. NaN outside the image and on
     /// invalid pixels.
     fn correlations(&self, p: [usize; 2], own: &Patch, radius: i32) -> Vec<(i64, Vec<f32>)> {
         let side = 2 * radius as usize + 1;
-        let columns = (self.picture.width() + 1).saturating_sub(padded(side)) as i64;
+        let columns = (self.image.width() + 1).saturating_sub(padded(side)) as i64;
         let corner = [0, 1].map(|axis| p[axis] as i64 - self.origin[axis] - i64::from(radius));
         let (top, rows) = &self.rows;
         let scores = |(row, &(first, count)): (i64, &(i64, usize))| {
@@ -92,7 +92,7 @@ impl Coarse {
             let (low, high) = (from.max(0), (from + count as i64).min(columns));
             if low < high && (0..self.inverse_deviation.height() as i64).contains(&row) {
                 let within = &mut scores[(low - from) as usize..(high - from) as usize];
-                own.products(&self.picture, (low as usize, row as usize), within);
+                own.products(&self.image, (low as usize, row as usize), within);
                 let inverse = &self.inverse_deviation.row(row as usize)[low as usize..];
                 within.iter_mut().zip(inverse).for_each(|(score, inverse)| *score = *score * inverse / side as f32);
             }
@@ -135,8 +135,8 @@ fn places(map: &LocalMap, range_m: (f64, f64), band: i32) -> Option<Vec<(f64, Ve
 }
 
 /// Resamples the source to the frame of the reference at the map's middle height, with `more` void
-/// columns behind it. Returns the reference position of the first pixel and the picture.
-fn lay_over(source: &Grid<f32>, map: &LocalMap, more: usize) -> Option<([i64; 2], Grid<f32>)> {
+/// columns behind it. Returns the reference position of the first pixel and the image.
+fn warped(source: &Grid<f32>, map: &LocalMap, more: usize) -> Option<([i64; 2], Grid<f32>)> {
     let (w, h) = (source.width() as f64 - 1.0, source.height() as f64 - 1.0);
     let mut span = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
     for corner in [[0.0, 0.0], [w, 0.0], [0.0, h], [w, h]] {
@@ -146,7 +146,7 @@ fn lay_over(source: &Grid<f32>, map: &LocalMap, more: usize) -> Option<([i64; 2]
         }
     }
     let origin = [span[0][0].floor() as i64, span[1][0].floor() as i64];
-    // A map that enlarges the picture this much does not connect two views of the same ground.
+    // A map that enlarges the image this much does not connect two views of the same ground.
     let area = (span[0][1] - span[0][0] + 2.0) * (span[1][1] - span[1][0] + 2.0);
     if !area.is_finite() || area > 16.0 * (w + 1.0) * (h + 1.0) {
         return None;

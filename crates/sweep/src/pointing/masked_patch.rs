@@ -1,4 +1,4 @@
-//! A patch with hidden pixels compared with parts of a picture that has hidden pixels, too.
+//! A patch with hidden pixels compared with parts of an image that has hidden pixels, too.
 //!
 //! The zero-mean normalised cross-correlation of the pixels that both show (Padfield 2012): with
 //! the masks m and M, sums over m·M of both values, of their squares and of their product.
@@ -30,7 +30,7 @@ pub(super) struct MaskedPatch {
     clear: usize,
 }
 
-/// Returns how many of a patch's clear pixels the picture must show, too: half of them, and of a
+/// Returns how many of a patch's clear pixels the image must show, too: half of them, and of a
 /// large patch no more than are enough.
 pub(super) fn needed(clear: usize) -> usize {
     ENOUGH.min(clear / 2)
@@ -105,21 +105,21 @@ impl MaskedPatch {
         self.clear == self.side * self.side
     }
 
-    /// Returns the correlation with every part of a picture whose mean is near 0; [`NO_PIXELS`]
+    /// Returns the correlation with every part of an image whose mean is near 0; [`NO_PIXELS`]
     /// where both show too little together, or one has no texture there. A part without [`padded`]
     /// columns from its first one counts as hidden.
-    pub(super) fn correlations(&self, picture: &Grid<f32>) -> Grid<f32> {
-        let mask = picture.map(|v| if v.is_finite() { 1.0 } else { 0.0 });
-        let values = picture.map(|v| if v.is_finite() { *v } else { 0.0 });
+    pub(super) fn correlations(&self, image: &Grid<f32>) -> Grid<f32> {
+        let mask = image.map(|v| if v.is_finite() { 1.0 } else { 0.0 });
+        let values = image.map(|v| if v.is_finite() { *v } else { 0.0 });
         let squares = values.map(|v| v * v);
-        let (columns, rows) = ((picture.width() + 1).saturating_sub(padded(self.side)), picture.height() + 1);
+        let (columns, rows) = ((image.width() + 1).saturating_sub(padded(self.side)), image.height() + 1);
         let mut scores = Grid::filled(columns, rows.saturating_sub(self.side), NO_PIXELS);
         let own = [&self.values[..], &self.squares, &self.mask];
         let other = [values.data(), squares.data(), mask.data()];
         let needed = needed(self.clear).max(1) as f32;
         for y in 0..scores.height() {
             for (x, score) in scores.row_mut(y).iter_mut().enumerate() {
-                let [n, f, ff, g, gg, fg] = sums(own, padded(self.side), other, picture.width(), (x, y));
+                let [n, f, ff, g, gg, fg] = sums(own, padded(self.side), other, image.width(), (x, y));
                 let (vf, vg) = (ff - f * f / n, gg - g * g / n);
                 if n >= needed && vf > TEXTURE * ff && vg > TEXTURE * gg {
                     *score = (fg - f * g / n) / (vf * vg).sqrt();
@@ -130,7 +130,7 @@ impl MaskedPatch {
     }
 }
 
-/// Returns the number of pixels that both show, the sums of the picture's values and squares and of
+/// Returns the number of pixels that both show, the sums of the image's values and squares and of
 /// the patch's over them, and the sum of products.
 #[multiversion(targets("x86_64+avx2"))]
 fn sums(own: [&[f32]; 3], stride: usize, other: [&[f32]; 3], width: usize, (x, y): (usize, usize)) -> [f32; 6] {

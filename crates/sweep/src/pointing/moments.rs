@@ -1,4 +1,4 @@
-//! Means and deviations of all patches of a picture. NaN marks invalid pixels and spreads to every
+//! Means and deviations of all patches of an image. NaN marks invalid pixels and spreads to every
 //! patch that touches one.
 
 use multiversion::multiversion;
@@ -30,7 +30,7 @@ fn slide(v: &[f32], side: usize, out: &mut [f32]) {
     }
 }
 
-/// Computes the mean and `1 / sqrt(variance + floor)` of every `side × side` patch of a picture of
+/// Computes the mean and `1 / sqrt(variance + floor)` of every `side × side` patch of an image of
 /// `width` columns. `line` is a scratch buffer of two rows.
 #[multiversion(targets("x86_64+avx2+fma"))]
 pub(crate) fn patch_moments(
@@ -72,17 +72,17 @@ pub(crate) fn patch_moments(
     }
 }
 
-/// Computes `1 / deviation` of every whole `side × side` patch of a picture, `floor` added to the
+/// Computes `1 / deviation` of every whole `side × side` patch of an image, `floor` added to the
 /// variance; NaN where the patch is invalid or no stronger than the noise.
-pub(crate) fn inverse_deviations(picture: &Grid<f32>, side: usize, noise: f32, floor: f32) -> Grid<f32> {
-    if picture.width() < side || picture.height() < side {
+pub(crate) fn inverse_deviations(image: &Grid<f32>, side: usize, noise: f32, floor: f32) -> Grid<f32> {
+    if image.width() < side || image.height() < side {
         return Grid::filled(0, 0, f32::NAN);
     }
-    let (w, h) = (picture.width() + 1 - side, picture.height() + 1 - side);
+    let (w, h) = (image.width() + 1 - side, image.height() + 1 - side);
     let mut mean = vec![0.0; w * h];
     let mut out = Grid::filled(w, h, f32::NAN);
-    let mut line = vec![0.0; 2 * picture.width()];
-    patch_moments(picture.data(), picture.width(), side, floor, &mut line, &mut mean, out.data_mut());
+    let mut line = vec![0.0; 2 * image.width()];
+    patch_moments(image.data(), image.width(), side, floor, &mut line, &mut mean, out.data_mut());
     out.data_mut().iter_mut().filter(|v| **v * noise >= 1.0 || v.is_infinite()).for_each(|v| *v = f32::NAN);
     out
 }

@@ -11,7 +11,7 @@ const LANES: usize = 16;
 /// Neighbouring places that are compared together: four vectors of eight values hide the latency of
 /// an addition.
 const TOGETHER: usize = 32;
-/// Correlation with a part of a picture that has no valid pixels or no texture.
+/// Correlation with a part of an image that has no valid pixels or no texture.
 pub(crate) const NO_PIXELS: f32 = -1.0;
 
 /// A zero-mean, unit-norm patch of `2 · radius + 1` pixels.
@@ -21,7 +21,7 @@ pub(crate) struct Patch {
     values: Vec<f32>,
 }
 
-/// Returns the length of a patch's rows in memory, which is also how many columns of a picture a
+/// Returns the length of a patch's rows in memory, which is also how many columns of an image a
 /// comparison reads.
 pub(crate) fn padded(side: usize) -> usize {
     side.next_multiple_of(LANES)
@@ -50,32 +50,32 @@ impl Patch {
         Some(Self { side, values })
     }
 
-    /// Computes the sums of products with the parts of a picture that begin at `(x, y)`, `(x + 1,
-    /// y)` and so on. The picture must be free of NaN and have [`padded`] columns from the last
+    /// Computes the sums of products with the parts of an image that begin at `(x, y)`, `(x + 1,
+    /// y)` and so on. The image must be free of NaN and have [`padded`] columns from the last
     /// one on.
-    pub(crate) fn products(&self, picture: &Grid<f32>, (x, y): (usize, usize), out: &mut [f32]) {
+    pub(crate) fn products(&self, image: &Grid<f32>, (x, y): (usize, usize), out: &mut [f32]) {
         let stride = padded(self.side);
         let (together, rest) = out.as_chunks_mut::<TOGETHER>();
         for (at, sums) in (x..).step_by(TOGETHER).zip(together.iter_mut()) {
-            products_together(&self.values, stride, picture, (at, y), sums);
+            products_together(&self.values, stride, image, (at, y), sums);
         }
         let at = x + TOGETHER * together.len();
         for (x, sum) in (at..).zip(rest) {
-            *sum = product(&self.values, stride, picture, (x, y));
+            *sum = product(&self.values, stride, image, (x, y));
         }
     }
 
-    /// Returns the zero-mean normalised cross-correlation with every part of a picture;
-    /// [`NO_PIXELS`] where a part holds invalid pixels or is flatter than the noise. The picture
+    /// Returns the zero-mean normalised cross-correlation with every part of an image;
+    /// [`NO_PIXELS`] where a part holds invalid pixels or is flatter than the noise. The image
     /// must have a mean near 0. A part without [`padded`] columns from its first one counts as
     /// invalid.
-    pub(crate) fn correlations(&self, mut picture: Grid<f32>, noise: f32) -> Grid<f32> {
-        let mut scores = inverse_deviations(&picture, self.side, noise, 0.0);
-        picture.data_mut().iter_mut().filter(|v| v.is_nan()).for_each(|v| *v = 0.0);
-        let columns = (picture.width() + 1).saturating_sub(padded(self.side));
+    pub(crate) fn correlations(&self, mut image: Grid<f32>, noise: f32) -> Grid<f32> {
+        let mut scores = inverse_deviations(&image, self.side, noise, 0.0);
+        image.data_mut().iter_mut().filter(|v| v.is_nan()).for_each(|v| *v = 0.0);
+        let columns = (image.width() + 1).saturating_sub(padded(self.side));
         let mut products = vec![0.0; columns.min(scores.width())];
         for y in 0..scores.height() {
-            self.products(&picture, (0, y), &mut products);
+            self.products(&image, (0, y), &mut products);
             let row = scores.row_mut(y);
             let (within, behind) = row.split_at_mut(products.len());
             for (score, product) in within.iter_mut().zip(&products) {
@@ -88,9 +88,9 @@ impl Patch {
 }
 
 #[multiversion(targets("x86_64+avx2"))]
-fn product(values: &[f32], stride: usize, picture: &Grid<f32>, at: (usize, usize)) -> f32 {
+fn product(values: &[f32], stride: usize, image: &Grid<f32>, at: (usize, usize)) -> f32 {
     let mut sums = [0.0f32; LANES];
-    for (own, other) in rows(values, stride, picture, at) {
+    for (own, other) in rows(values, stride, image, at) {
         for (a, b) in own.iter().zip(other) {
             (0..LANES).for_each(|i| sums[i] += a[i] * b[i]);
         }
@@ -103,12 +103,12 @@ fn product(values: &[f32], stride: usize, picture: &Grid<f32>, at: (usize, usize
 fn products_together(
     values: &[f32],
     stride: usize,
-    picture: &Grid<f32>,
+    image: &Grid<f32>,
     (x, y): (usize, usize),
     out: &mut [f32; TOGETHER],
 ) {
-    let width = picture.width();
-    let under = &picture.data()[y * width + x..];
+    let width = image.width();
+    let under = &image.data()[y * width + x..];
     let mut sums = [0.0f32; TOGETHER];
     for lane in 0..LANES {
         let mut sum = [0.0f32; TOGETHER];
@@ -125,15 +125,15 @@ fn products_together(
 
 type Lanes = [f32; LANES];
 
-/// Iterates over the rows of a patch, each with the row of the picture below it from `(x, y)` on.
+/// Iterates over the rows of a patch, each with the row of the image below it from `(x, y)` on.
 #[inline(always)]
 fn rows<'a>(
     values: &'a [f32],
     stride: usize,
-    picture: &'a Grid<f32>,
+    image: &'a Grid<f32>,
     (x, y): (usize, usize),
 ) -> impl Iterator<Item = (&'a [Lanes], &'a [Lanes])> {
-    let under = picture.data()[y * picture.width() + x..].chunks(picture.width());
+    let under = image.data()[y * image.width() + x..].chunks(image.width());
     let whole = move |row: &'a [f32]| row[..stride].as_chunks::<LANES>().0;
     values.chunks_exact(stride).zip(under).map(move |(own, other)| (whole(own), whole(other)))
 }
@@ -152,7 +152,7 @@ pub(crate) fn parabola_peak(left: f32, middle: f32, right: f32) -> f64 {
 mod tests {
     use super::*;
 
-    /// Compares with the definition of the correlation on a picture with a void.
+    /// Compares with the definition of the correlation on an image with a void.
     #[test]
     fn the_correlation_is_that_of_the_definition() {
         let value = |x: usize, y: usize| ((x * x + 3 * y * y + x * y) as f32 * 0.37).sin() * 20.0;
@@ -194,14 +194,14 @@ mod tests {
     #[test]
     fn a_place_has_the_same_bits_alone_and_beside_others() {
         let value = |k: usize| ((k * k) as f32 * 0.013).sin() * 30.0 + (k % 7) as f32;
-        let picture = Grid::from_vec(130, 40, (0..130 * 40).map(value).collect()).unwrap();
+        let image = Grid::from_vec(130, 40, (0..130 * 40).map(value).collect()).unwrap();
         for radius in [7, 12] {
-            let patch = Patch::around(&picture, [60.0, 20.0], radius, 0.1).unwrap();
+            let patch = Patch::around(&image, [60.0, 20.0], radius, 0.1).unwrap();
             let mut products = vec![0.0; 2 * TOGETHER + 5];
-            patch.products(&picture, (3, 4), &mut products);
+            patch.products(&image, (3, 4), &mut products);
             for (at, product) in (3..).zip(&products) {
                 let mut alone = [0.0];
-                patch.products(&picture, (at, 4), &mut alone);
+                patch.products(&image, (at, 4), &mut alone);
                 assert_eq!(alone[0].to_bits(), product.to_bits(), "radius {radius}, column {at}");
             }
         }

@@ -250,7 +250,7 @@ impl Pair<'_> {
     ///
     /// `at` is a position on the level in the reference; offsets are source pixels from its
     /// projection at `height_m`. The source is resampled once in the frame of the reference, so
-    /// that every place tried is a part of that picture.
+    /// that every place tried is a part of what was resampled.
     pub(super) fn refine(
         &self,
         at: [f64; 2],
@@ -266,13 +266,13 @@ impl Pair<'_> {
         let from = [centre[0] + start[0], centre[1] + start[1]];
         let reach = config.radius + reach_px;
         let (side, whole) = (2 * config.radius as usize + 1, 2 * reach as usize + 1);
-        let mut picture = Grid::filled(whole + padded(side) - side, whole, f32::NAN);
-        for j in 0..picture.height() {
+        let mut resampled = Grid::filled(whole + padded(side) - side, whole, f32::NAN);
+        for j in 0..resampled.height() {
             let line = frame.place(from, -reach, j as i32 - reach);
-            bicubic_along(&self.source.levels[level], line, frame.column_step(), &mut picture.row_mut(j)[..whole]);
+            bicubic_along(&self.source.levels[level], line, frame.column_step(), &mut resampled.row_mut(j)[..whole]);
         }
-        remove_mean(picture.data_mut());
-        let scores = own.correlations(picture, self.source.noise_at(level));
+        remove_mean(resampled.data_mut());
+        let scores = own.correlations(resampled, self.source.noise_at(level));
         let mut best = (NO_PIXELS, 0usize, 0usize);
         for (j, i) in (0..places).flat_map(|j| (0..places).map(move |i| (j, i))) {
             if scores[(i, j)] > best.0 {

@@ -2,11 +2,11 @@
 
 use raster::{Window, bicubic_along, cubic_weights};
 
-use super::census::{Census, CensusScratch, census_cost, overhang, picture_cost};
+use super::census::{Census, CensusScratch, census_cost, image_cost, overhang};
 use super::kernels::{self, FULL};
 use super::part::{MARGIN, Part};
 use super::scale::census_scale;
-use super::shift::{BicubicShift, OVERHANG, Picture, shift_bicubic};
+use super::shift::{BicubicShift, Image, OVERHANG, shift_bicubic};
 use super::voids::Voids;
 use crate::geometry::LocalMap;
 use crate::view::ViewLevel;
@@ -16,30 +16,30 @@ const CUBIC_TAPS: usize = 4;
 
 /// A source resampled over the tile at the middle height, and its state for the current plane.
 #[derive(Default)]
-pub(super) struct LaidSource {
+pub(super) struct WarpedSource {
     /// Local map from the tile to the source; `None` if the source does not see the tile.
     map: Option<LocalMap>,
-    /// The resampled picture.
-    picture: Vec<i16>,
+    /// The resampled image.
+    image: Vec<i16>,
     /// Places whose census, after a shift, would read a void.
     voids: Voids,
-    /// Columns of the picture.
+    /// Columns of the image.
     stride: usize,
-    /// Rows of the picture.
+    /// Rows of the image.
     rows: usize,
-    /// Column and row of the picture's first pixel, relative to the tile with its margin.
+    /// Column and row of the image's first pixel, relative to the tile with its margin.
     origin: [i64; 2],
-    /// Place in the picture of the part's first pixel for the current plane; `None` if the source
+    /// Place in the image of the part's first pixel for the current plane; `None` if the source
     /// does not see the part there.
     at: Option<(usize, usize)>,
-    /// Census of the shifted picture for the current plane.
+    /// Census of the shifted image for the current plane.
     census: Census,
 }
 
 /// Scratch buffers for one plane.
 #[derive(Default)]
 pub(super) struct PlaneScratch {
-    /// The shifted picture.
+    /// The shifted image.
     shifted: Vec<i16>,
     /// Rows of the interpolation.
     rows: Vec<i16>,
@@ -47,10 +47,10 @@ pub(super) struct PlaneScratch {
     census: CensusScratch,
 }
 
-impl LaidSource {
+impl WarpedSource {
     /// Resamples the source over the padded tile at the map's middle height, wide enough for shifts
     /// to all heights in metres from `h_lo` to `h_hi`.
-    pub(super) fn lay_over(
+    pub(super) fn warp(
         &mut self,
         source: &ViewLevel<'_>,
         map: Option<LocalMap>,
@@ -86,7 +86,7 @@ impl LaidSource {
             let (from, next) = (map.at([x, y], map.mid_height_m()), map.at([x + 1.0, y], map.mid_height_m()));
             bicubic_along(source.image, from, [next[0] - from[0], next[1] - from[1]], out);
         }
-        let has_voids = kernels::quantise(grey, FULL * census_scale(source), OVERHANG, &mut self.picture);
+        let has_voids = kernels::quantise(grey, FULL * census_scale(source), OVERHANG, &mut self.image);
         if has_voids && grey.iter().all(|value| value.is_nan()) {
             // The source shows another place: its costs are invalid without being computed.
             self.map = None;
@@ -95,7 +95,7 @@ impl LaidSource {
         self.voids.mark(grey, self.stride, CUBIC_TAPS + 2 * MARGIN, has_voids);
     }
 
-    /// Shifts the picture so that the part lies over it at a height.
+    /// Shifts the image so that the part lies over it at a height.
     pub(super) fn place(&mut self, height_m: f64, part: Part, scratch: &mut PlaneScratch) {
         self.at = None;
         let Some([dx, dy]) = self.map.and_then(|m| m.shift_at(height_m)) else { return };
@@ -113,7 +113,7 @@ impl LaidSource {
         self.at = Some(at);
         scratch.shifted.resize(part.area() + overhang(part.width), 0);
         shift_bicubic(BicubicShift {
-            picture: Picture { data: &self.picture, stride: self.stride },
+            image: Image { data: &self.image, stride: self.stride },
             at,
             column_weights: cubic_weights((dx - fx) as f32).map(kernels::fixed),
             row_weights: cubic_weights((dy - fy) as f32).map(kernels::fixed),
@@ -123,14 +123,14 @@ impl LaidSource {
         });
     }
 
-    /// Keeps the census of the picture that was just shifted.
+    /// Keeps the census of the image that was just shifted.
     pub(super) fn grade(&mut self, part: Part, scratch: &PlaneScratch) {
         if self.at.is_some() {
             self.census.fill(&scratch.shifted, part.width, part.area());
         }
     }
 
-    /// Computes the costs of the shifted picture against the reference. Where the source has a void
+    /// Computes the costs of the shifted image against the reference. Where the source has a void
     /// they are raised to `worst`; returns whether it has one.
     pub(super) fn cost(
         &self,
@@ -141,7 +141,7 @@ impl LaidSource {
         costs: &mut [u8],
     ) -> bool {
         if self.at.is_some() {
-            picture_cost(&scratch.shifted, reference, part.width, &mut scratch.census, costs);
+            image_cost(&scratch.shifted, reference, part.width, &mut scratch.census, costs);
         }
         self.hide(part, worst, costs)
     }
@@ -150,7 +150,7 @@ impl LaidSource {
     /// invalid where one of the two has a void; returns whether there is one.
     pub(super) fn cost_between(
         &self,
-        other: &LaidSource,
+        other: &WarpedSource,
         part: Part,
         scratch: &mut PlaneScratch,
         costs: &mut [u8],

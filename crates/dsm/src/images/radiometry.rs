@@ -8,7 +8,7 @@ use sweep::SweepView;
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
-pub struct ImageCharacter {
+pub struct ImageRadiometry {
     /// Standard deviation of the noise at full resolution, grey values, one per window.
     pub noise: Vec<f32>,
     /// Typical difference of neighbouring pixels, grey values, by level and window.
@@ -17,9 +17,9 @@ pub struct ImageCharacter {
     pub has_contrast: bool,
 }
 
-impl ImageCharacter {
+impl ImageRadiometry {
     /// Adds the measures of a window.
-    pub(crate) fn learn(&mut self, view: &SweepView) {
+    pub(crate) fn add_window(&mut self, view: &SweepView) {
         self.has_contrast |= !is_blank(view);
         self.noise.push(view.noise);
         self.contrast.resize(self.contrast.len().max(view.contrast.len()), Vec::new());
@@ -33,7 +33,7 @@ impl ImageCharacter {
 
     /// Gives a view of a part of the image the noise and contrast of the whole: the medians over
     /// the windows.
-    pub(crate) fn lend(&self, view: &mut SweepView) {
+    pub(crate) fn give_to(&self, view: &mut SweepView) {
         if let Some(noise) = median(&self.noise) {
             view.noise = noise;
         }
@@ -61,7 +61,7 @@ mod tests {
     #[test]
     fn an_image_is_blank_when_windows_were_seen_and_none_has_contrast() {
         let seen =
-            |noise: &[f32], has_contrast| ImageCharacter { noise: noise.to_vec(), has_contrast, ..Default::default() };
+            |noise: &[f32], has_contrast| ImageRadiometry { noise: noise.to_vec(), has_contrast, ..Default::default() };
         assert!(!seen(&[], false).is_blank() && seen(&[0.0, 0.0], false).is_blank() && !seen(&[0.0], true).is_blank());
         assert_eq!((median(&[9.0, 1.0, 2.0]), median(&[])), (Some(2.0), None));
     }

@@ -1,5 +1,5 @@
-//! The first look at a scene of which only the RPCs are known: the pixels, when they fit the
-//! memory, and tie points.
+//! Matching of images of which only the RPCs are known: their pixels, when they fit the memory, and
+//! tie points.
 //!
 //! Pointing is a property of the images. How ties are searched for follows from the images alone,
 //! whatever the cells, the chunks, the preset and the memory of the run.
@@ -14,9 +14,9 @@ use sweep::pointing::TieConfig;
 
 use crate::config::DsmConfig;
 use crate::error::{DsmError, DsmSetting};
-use crate::images::character::ImageCharacter;
 use crate::images::image_pixels::read_views;
 use crate::images::order::as_given;
+use crate::images::radiometry::ImageRadiometry;
 use crate::images::scene_image::SceneImage;
 use crate::memory;
 use crate::planning::chunk_side::{choose_side, needed_mb};
@@ -33,7 +33,7 @@ use crate::session::Session;
 const WHOLE_PIXELS: u64 = 24_000_000;
 
 /// What is known before the pointing is corrected.
-pub(crate) struct FirstLook {
+pub(crate) struct MatchedImages {
     /// Geometry at the height where ties were searched for, with the cameras of the providers.
     pub(crate) geometry: ViewGeometry,
     /// Pairs that can give heights, the best angles first.
@@ -44,12 +44,12 @@ pub(crate) struct FirstLook {
     pub(crate) cameras: Vec<RpcCamera>,
     /// Columns and rows of the images.
     pub(crate) sizes: Vec<(usize, usize)>,
-    pub(crate) characters: Vec<ImageCharacter>,
+    pub(crate) radiometry: Vec<ImageRadiometry>,
     /// Whether the whole scene is computed at once. The session then holds the views.
     pub(crate) is_whole: bool,
 }
 
-impl FirstLook {
+impl MatchedImages {
     fn has_ties(&self) -> bool {
         self.ties.iter().any(|t| t.ties.len() >= TIES_MIN)
     }
@@ -61,41 +61,41 @@ impl FirstLook {
 /// Those of the geometry ([`DsmError::Reconstruct`], [`DsmError::Camera`]),
 /// of the request ([`DsmError::Value`], [`DsmError::BoundsMissScene`], [`DsmError::Memory`]),
 /// [`DsmError::Image`], [`DsmError::Cancelled`].
-pub(crate) fn look(
+pub(crate) fn match_images(
     config: &DsmConfig,
     images: &[SceneImage],
     session: &mut Session<'_>,
-) -> Result<FirstLook, DsmError> {
+) -> Result<MatchedImages, DsmError> {
     let guess = images.iter().map(|o| o.camera.rpc.height_off).sum::<f64>() / images.len() as f64;
     let valid = validity_range(images, config.height_range_m);
     let expected = SceneImage::geometry(images, guess.clamp(valid.low_m, valid.high_m));
-    let looked = expected.and_then(|geometry| look_at(config, images, geometry, valid, session));
-    let has_ties = |l: &Result<FirstLook, DsmError>| l.as_ref().is_ok_and(FirstLook::has_ties);
+    let matched = expected.and_then(|geometry| match_at(config, images, geometry, valid, session));
+    let has_ties = |l: &Result<MatchedImages, DsmError>| l.as_ref().is_ok_and(MatchedImages::has_ties);
     let is_final = |e: &DsmError| matches!(e, DsmError::Image(_) | DsmError::Memory { .. } | DsmError::Cancelled);
-    if has_ties(&looked) || looked.as_ref().is_err_and(is_final) {
-        return looked;
+    if has_ties(&matched) || matched.as_ref().is_err_and(is_final) {
+        return matched;
     }
     let is_wider = |s: &SharedHeights| s.range.low_m < valid.low_m || s.range.high_m > valid.high_m;
-    let Some(shared) = SharedHeights::of(images).filter(is_wider) else { return looked };
+    let Some(shared) = SharedHeights::of(images).filter(is_wider) else { return matched };
     let views = session.views.take();
     let again = SceneImage::geometry(images, shared.best_m)
-        .and_then(|geometry| look_at(config, images, geometry, shared.range, session));
+        .and_then(|geometry| match_at(config, images, geometry, shared.range, session));
     if has_ties(&again) || matches!(again, Err(DsmError::Cancelled)) {
         return again;
     }
     // The first error is the better explanation, because the scene should be where the RPCs are
     // valid.
     session.views = views;
-    looked
+    matched
 }
 
-fn look_at(
+fn match_at(
     config: &DsmConfig,
     images: &[SceneImage],
     geometry: ViewGeometry,
     search: HeightRange,
     session: &mut Session<'_>,
-) -> Result<FirstLook, DsmError> {
+) -> Result<MatchedImages, DsmError> {
     let useful = geometry.useful_pairs()?;
     let asked = asked_pairs(config, images, &useful)?;
     let pairs = if config.pairs.is_some() { asked } else { tie_pairs(images, &geometry, &asked) };
@@ -125,20 +125,20 @@ fn look_at(
     } else {
         None
     };
-    let (ties, mut characters) = in_windows.unwrap_or_else(|| {
+    let (ties, mut radiometry) = in_windows.unwrap_or_else(|| {
         progress.begin("matching tie points", pairs.len());
         let views = views.as_deref().unwrap_or_default();
         let ties = match_pairs(views, &pairs, search, (&TieConfig::default(), TIES_MIN), &|| progress.step());
         (ties, Vec::new())
     });
     if let Some(views) = &views {
-        characters = vec![ImageCharacter::default(); images.len()];
-        characters.iter_mut().zip(views).for_each(|(character, view)| character.learn(view));
+        radiometry = vec![ImageRadiometry::default(); images.len()];
+        radiometry.iter_mut().zip(views).for_each(|(radiometry, view)| radiometry.add_window(view));
     }
     session.views = views.filter(|_| is_whole);
     let cameras = images.iter().map(|o| o.camera.clone()).collect();
     let sizes = images.iter().map(|o| o.size).collect();
-    Ok(FirstLook { geometry, useful, ties, cameras, sizes, characters, is_whole })
+    Ok(MatchedImages { geometry, useful, ties, cameras, sizes, radiometry, is_whole })
 }
 
 /// Returns whether the scene may be computed at once: it fits the memory, and smaller chunks are
