@@ -150,7 +150,7 @@ impl OpenChip {
             reach_px,
             image_from_chip,
         };
-        let chip = Chip { image: &self.picture, point: self.point };
+        let chip = Chip { image: &self.image, point: self.point };
         let placed = |ChipPlace { place, score }| {
             let [sample, line] = [place[0] + window.x as f64, place[1] + window.y as f64];
             (ImagePoint::new(sample, line), f64::from(score))

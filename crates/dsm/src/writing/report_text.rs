@@ -9,7 +9,7 @@ impl DsmReport {
     pub fn text(&self, output: &Path) -> String {
         let s = &self.surface;
         let share = |n: usize| 100.0 * n as f64 / s.cells.max(1) as f64;
-        let masked = match s.masked {
+        let masked = match s.counts.masked {
             0 => String::new(),
             cells => format!(", of them {:.1} % masked", share(cells)),
         };
@@ -23,9 +23,9 @@ impl DsmReport {
              time       {seconds:.1} s\n{control}",
             output.join("dsm/dsm.tif").display(),
             s.cells,
-            share(s.observed),
-            share(s.filled),
-            share(s.void),
+            share(s.counts.observed),
+            share(s.counts.filled),
+            share(s.counts.void),
             output.join("dsm/relief.png").display(),
             output.join("report/report.html").display(),
         )

@@ -35,6 +35,7 @@ use super::directions::{Around, Known, around};
 use super::plane::{Plane, border_planes};
 use super::source::CellSource;
 use super::speckle::remove_speckle;
+use crate::window_sums::window_sums;
 
 /// Which voids are filled.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -61,6 +62,9 @@ pub struct FillConfig {
     pub narrow_cells: f32,
     /// Distance in a void over which blind cells are the reason for it, cells.
     pub blind_reach_cells: usize,
+    /// Distance to each side over which heights tell whether the ground around a cell is known,
+    /// cells.
+    pub ground_reach_cells: usize,
     /// Smallest number of connected cells with heights from which voids are filled.
     pub island_cells: usize,
     /// The same where all of the heights are trusted.
@@ -97,6 +101,9 @@ const RIM_PART: f32 = 0.75;
 /// that a surface must have: fewer may be outliers.
 const AROUND: usize = 256;
 const LEAST_PART: usize = 10;
+/// Part of the known heights around a cell that lies at the ground where that goes on in a void: in
+/// the middle of a roof, and among crowns, none does.
+const GROUND_PART: f64 = 1.0 / 12.0;
 /// The lowest surface is the one with this many candidates under it: a few may be wrong.
 const LOWEST: usize = 5;
 /// Least part of the candidates of which the lowest is taken where there are few.
@@ -150,6 +157,7 @@ pub fn fill_voids(
     keep_trusted(&mut sources);
     let border = Border::new(&sources, &numbers);
     let planes = border_planes(border.cells(), count, config.same_surface_m);
+    let is_ground_near = is_ground_near(height_m, ground_m, config.ground_reach_cells);
     let beside_blind = beside(blind, &numbers, config.blind_reach_cells);
     let filling = Filling {
         numbers: &numbers,
@@ -159,6 +167,7 @@ pub fn fill_voids(
         beside_blind,
         completed_m,
         ground_m,
+        is_ground_near: &is_ground_near,
         only_roofs,
         config,
     };
@@ -172,6 +181,18 @@ pub fn fill_voids(
         }
     }
     FilledVoids { source, sigma_m }
+}
+
+/// Marks the cells around which enough of the heights within `reach` cells lie at the ground.
+fn is_ground_near(height_m: &Grid<f32>, ground_m: &Grid<f32>, reach: usize) -> Grid<bool> {
+    let (count, width) = (height_m.data().len(), height_m.width());
+    let above_m = |i: usize| height_m.data()[i] - ground_m.data()[i];
+    let known = window_sums(count, width, reach, |i| f64::from(u8::from(!height_m.data()[i].is_nan())));
+    let at_ground = window_sums(count, width, reach, |i| f64::from(u8::from(above_m(i).abs() < ON_GROUND_M)));
+    let mut out = height_m.map(|_| false);
+    let cells = out.data_mut().iter_mut().zip(known.iter().zip(&at_ground));
+    cells.for_each(|(is_near, (known, at_ground))| *is_near = *known > 0.0 && *at_ground >= GROUND_PART * known);
+    out
 }
 
 /// Marks the void cells that a way of at most `reach` cells through their void joins with blind
@@ -231,6 +252,7 @@ struct Filling<'a> {
     beside_blind: Grid<bool>,
     completed_m: &'a Grid<f32>,
     ground_m: &'a Grid<f32>,
+    is_ground_near: &'a Grid<bool>,
     only_roofs: &'a Grid<bool>,
     config: &'a FillConfig,
 }
@@ -253,10 +275,13 @@ impl Filling<'_> {
         // ground may be further away than the walls.
         let may_be_far = may_be_hidden && !is_under && !is_narrow && plane.is_none() && bound_m > f32::NEG_INFINITY;
         let ground_m = self.ground_m.data()[index];
-        // Between two surfaces above the ground, a narrow void is a gap in one of them. Where all
-        // that is known are roofs, it is the street between them.
-        let may_be_street = self.only_roofs.data()[index];
-        let is_gap = is_narrow && !may_be_street && around.is_enclosed_by(|k| k.height_m > ground_m + STOREY_M);
+        // Two views would match what stands there, and hardly match ground in a shadow.
+        let is_ground_seen = bound_m <= ground_m;
+        // Where all that is known are roofs, it is the street between them.
+        let may_be_street = is_ground_seen && self.only_roofs.data()[index];
+        let may_be_ground = may_be_street || (is_ground_seen && self.is_ground_near.data()[index]);
+        // Between two surfaces above the ground, another narrow void is a gap in one of them.
+        let is_gap = is_narrow && !may_be_ground && around.is_enclosed_by(|k| k.height_m > ground_m + STOREY_M);
         let lowered = |surface: Estimate| {
             let is_above = !is_gap && surface.height_m > ground_m + STOREY_M;
             if is_above { surface.at(ground_m) } else { surface }
@@ -291,7 +316,7 @@ impl Filling<'_> {
                 None => {
                     let surface = below().unwrap_or(lower.estimate);
                     let would_be_seen = bound_m > f32::NEG_INFINITY && lower.base_m > bound_m;
-                    if would_be_seen || may_be_street { lowered(surface) } else { surface }
+                    if would_be_seen || may_be_ground { lowered(surface) } else { surface }
                 }
             })
         };

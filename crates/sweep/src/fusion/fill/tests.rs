@@ -8,6 +8,7 @@ const CONFIG: FillConfig = FillConfig {
     hidden_reach_cells: 50,
     narrow_cells: 6.0,
     blind_reach_cells: 4,
+    ground_reach_cells: 10,
     island_cells: 36,
     trusted_island_cells: 16,
     same_surface_m: 1.0,
