@@ -56,6 +56,8 @@ const FILL_BLIND_M: f64 = 5.0;
 /// Distance to each side over which heights tell whether the ground around a void is known, metres:
 /// from the middle of a street over the houses beside it.
 const FILL_GROUND_M: f64 = 10.0;
+/// Distance to each side over which the share of voids is judged, metres: a few houses.
+const FILL_QUARTER_M: f64 = 30.0;
 /// Growth of the standard deviation of a filled height per metre to the nearest known one: ground
 /// rises and falls, and something small may stand there.
 const FILL_SIGMA_SLOPE: f64 = 0.1;
@@ -229,6 +231,7 @@ fn fill_config(fill: Fill, gsd_m: f64) -> FillConfig {
         narrow_cells: (FILL_NARROW_M / gsd_m) as f32,
         blind_reach_cells: (FILL_BLIND_M / gsd_m).ceil() as usize,
         ground_reach_cells: (FILL_GROUND_M / gsd_m).ceil() as usize,
+        quarter_reach_cells: (FILL_QUARTER_M / gsd_m).ceil() as usize,
         island_cells: (FILL_NARROW_M / gsd_m).powi(2) as usize,
         trusted_island_cells: (FILL_HOUSE_M / gsd_m).powi(2) as usize,
         same_surface_m: (2.0 * gsd_m) as f32,

@@ -20,6 +20,7 @@ use crate::surface::clean_up::{Lengths, Voids, clean_up};
 use crate::surface::fill::Fill;
 use crate::surface::grid_sight::{ViewPixels, grid_sights};
 use crate::surface::ground_mask::GroundMask;
+use crate::surface::overreach::ImagedHeights;
 use crate::surface::rasters::SurfaceRasters;
 use crate::surface::shadow_side::ShadowCounts;
 use crate::values::{HeightRange, ImagePair};
@@ -191,6 +192,13 @@ pub fn make_surface(
                 let blank = own.view.blank(finest);
                 let mut keep = agreeing(own, &witnesses(own, &all, useful, &sweep.sources), level)?;
                 drop_at_rim(&mut keep, own.map, sweep.range, step_m);
+                let imaged = ImagedHeights {
+                    image: &own.view.levels[finest],
+                    noise: own.view.noise_at(finest),
+                    height_m: &own.map.height_m,
+                    step_m: step_m as f32,
+                };
+                imaged.drop_overreach(&mut keep);
                 if let Some(asked) = options.height_range {
                     drop_outside(&mut keep, own.map, asked);
                 }

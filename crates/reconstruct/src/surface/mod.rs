@@ -5,5 +5,6 @@ pub(super) mod fill;
 mod grid_sight;
 pub(super) mod ground_mask;
 pub(super) mod make;
+mod overreach;
 pub(super) mod rasters;
 pub(super) mod shadow_side;

@@ -17,8 +17,10 @@
 //!   blank, unless the views agree there on a roof whose rim was seen.
 //! - Where the ground is known, it takes the place of what lies near it or below it, of what is
 //!   hidden under a surface a storey higher, and of a surface that two views would have seen.
-//!   Narrow gaps between two such surfaces keep theirs, but not in a dense quarter of which hardly
-//!   any ground is known: there they are the streets.
+//!   Narrow gaps between two such surfaces keep theirs, unless two views see past them down to the
+//!   ground and heights around lie at it, too. In a dense quarter of which hardly any ground is
+//!   known, they are streets where two views see down to the ground, or where hardly anything but
+//!   voids is around.
 //! - What fewer than two views image is outside and stays open, unless it is narrow.
 //!
 //! Small islands of heights may be chance, so that nothing is filled from them. Trusted ones are
@@ -35,7 +37,7 @@ use super::directions::{Around, Known, around};
 use super::plane::{Plane, border_planes};
 use super::source::CellSource;
 use super::speckle::remove_speckle;
-use crate::window_sums::window_sums;
+use crate::window_sums::{window_means, window_sums};
 
 /// Which voids are filled.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -65,6 +67,9 @@ pub struct FillConfig {
     /// Distance to each side over which heights tell whether the ground around a cell is known,
     /// cells.
     pub ground_reach_cells: usize,
+    /// Distance to each side over which the share of voids tells whether buildings may fill them,
+    /// cells.
+    pub quarter_reach_cells: usize,
     /// Smallest number of connected cells with heights from which voids are filled.
     pub island_cells: usize,
     /// The same where all of the heights are trusted.
@@ -104,6 +109,9 @@ const LEAST_PART: usize = 10;
 /// Part of the known heights around a cell that lies at the ground where that goes on in a void: in
 /// the middle of a roof, and among crowns, none does.
 const GROUND_PART: f64 = 1.0 / 12.0;
+/// Share of a quarter above which its voids are ground, also where none is seen: buildings hardly
+/// cover more of it.
+const MOSTLY: f64 = 2.0 / 3.0;
 /// The lowest surface is the one with this many candidates under it: a few may be wrong.
 const LOWEST: usize = 5;
 /// Least part of the candidates of which the lowest is taken where there are few.
@@ -158,6 +166,7 @@ pub fn fill_voids(
     let border = Border::new(&sources, &numbers);
     let planes = border_planes(border.cells(), count, config.same_surface_m);
     let is_ground_near = is_ground_near(height_m, ground_m, config.ground_reach_cells);
+    let is_mostly_void = is_mostly_void(height_m, config.quarter_reach_cells);
     let beside_blind = beside(blind, &numbers, config.blind_reach_cells);
     let filling = Filling {
         numbers: &numbers,
@@ -168,6 +177,7 @@ pub fn fill_voids(
         completed_m,
         ground_m,
         is_ground_near: &is_ground_near,
+        is_mostly_void: &is_mostly_void,
         only_roofs,
         config,
     };
@@ -192,6 +202,15 @@ fn is_ground_near(height_m: &Grid<f32>, ground_m: &Grid<f32>, reach: usize) -> G
     let mut out = height_m.map(|_| false);
     let cells = out.data_mut().iter_mut().zip(known.iter().zip(&at_ground));
     cells.for_each(|(is_near, (known, at_ground))| *is_near = *known > 0.0 && *at_ground >= GROUND_PART * known);
+    out
+}
+
+/// Marks the cells around which most cells within `reach` are void.
+fn is_mostly_void(height_m: &Grid<f32>, reach: usize) -> Grid<bool> {
+    let heights = height_m.data();
+    let voids = window_means(heights.len(), height_m.width(), reach, |i| f64::from(u8::from(heights[i].is_nan())));
+    let mut out = height_m.map(|_| false);
+    out.data_mut().iter_mut().zip(voids).for_each(|(is_mostly, share)| *is_mostly = share > MOSTLY);
     out
 }
 
@@ -253,6 +272,7 @@ struct Filling<'a> {
     completed_m: &'a Grid<f32>,
     ground_m: &'a Grid<f32>,
     is_ground_near: &'a Grid<bool>,
+    is_mostly_void: &'a Grid<bool>,
     only_roofs: &'a Grid<bool>,
     config: &'a FillConfig,
 }
@@ -275,10 +295,11 @@ impl Filling<'_> {
         // ground may be further away than the walls.
         let may_be_far = may_be_hidden && !is_under && !is_narrow && plane.is_none() && bound_m > f32::NEG_INFINITY;
         let ground_m = self.ground_m.data()[index];
-        // Two views would match what stands there, and hardly match ground in a shadow.
+        // Whether two views see past the known surface down to the ground. They match what stands
+        // high rather than ground in a shadow.
         let is_ground_seen = bound_m <= ground_m;
-        // Where all that is known are roofs, it is the street between them.
-        let may_be_street = is_ground_seen && self.only_roofs.data()[index];
+        // Where all that is known are roofs, a void is the street between them.
+        let may_be_street = self.only_roofs.data()[index] && (is_ground_seen || self.is_mostly_void.data()[index]);
         let may_be_ground = may_be_street || (is_ground_seen && self.is_ground_near.data()[index]);
         // Between two surfaces above the ground, another narrow void is a gap in one of them.
         let is_gap = is_narrow && !may_be_ground && around.is_enclosed_by(|k| k.height_m > ground_m + STOREY_M);

@@ -9,6 +9,7 @@ const CONFIG: FillConfig = FillConfig {
     narrow_cells: 6.0,
     blind_reach_cells: 4,
     ground_reach_cells: 10,
+    quarter_reach_cells: 30,
     island_cells: 36,
     trusted_island_cells: 16,
     same_surface_m: 1.0,
@@ -210,6 +211,8 @@ struct Street {
     ground_m: f32,
     bound_m: f32,
     only_roofs: bool,
+    /// Cells of the roofs on each side that are known, and of the known ground behind them.
+    known: [usize; 2],
 }
 
 impl Street {
@@ -222,6 +225,10 @@ impl Street {
             row[..20].fill(self.roofs_m[0] + higher_m);
             row[20 + self.width..].fill(self.roofs_m[1] - higher_m);
             row[20..20 + self.width].fill(f32::NAN);
+            let [roof, ground] = self.known;
+            row[..20 - roof].fill(f32::NAN);
+            row[20 + self.width + roof..].fill(f32::NAN);
+            row[..ground].fill(self.ground_m);
         }
         let ground_m = height_m.map(|_| self.ground_m);
         let only_roofs = height_m.map(|_| self.only_roofs);
@@ -232,7 +239,7 @@ impl Street {
 }
 
 const WIDE_STREET: Street =
-    Street { width: 14, roofs_m: [20.0, 27.0], ground_m: 2.0, bound_m: 10.0, only_roofs: false };
+    Street { width: 14, roofs_m: [20.0, 27.0], ground_m: 2.0, bound_m: 10.0, only_roofs: false, known: [20, 0] };
 const NARROW_STREET: Street = Street { width: 4, roofs_m: [20.0, 26.0], ..WIDE_STREET };
 
 #[test]
@@ -245,10 +252,22 @@ fn ground_fills_a_street_that_two_views_would_have_seen_and_no_narrow_gap_of_a_r
 }
 
 #[test]
-fn a_narrow_void_is_a_street_where_roofs_are_all_that_is_known() {
-    for bound_m in [10.0, 30.0, f32::NEG_INFINITY] {
-        let street = Street { bound_m, only_roofs: true, ..NARROW_STREET };
-        assert_eq!(street.filled(), (2.0, CellSource::FilledStreet));
+fn a_narrow_void_between_roofs_is_ground_where_two_views_see_down_to_it_and_more_of_it_is_known() {
+    let beside = |known, bound_m| Street { known, bound_m, ..NARROW_STREET }.filled();
+    assert_eq!(beside([6, 14], 1.0), (2.0, CellSource::FilledNarrow));
+    assert!(beside([6, 14], 10.0).0 >= 20.0);
+    assert!(beside([20, 0], 1.0).0 >= 20.0);
+}
+
+#[test]
+fn a_narrow_void_is_a_street_where_roofs_are_all_that_is_known_and_its_ground_is_seen_or_most_is_void() {
+    let street = |bound_m, known| Street { bound_m, only_roofs: true, known, ..NARROW_STREET }.filled();
+    for bound_m in [1.0, f32::NEG_INFINITY] {
+        assert_eq!(street(bound_m, [20, 0]), (2.0, CellSource::FilledStreet));
+    }
+    for bound_m in [10.0, 30.0] {
+        assert!(street(bound_m, [20, 0]).0 >= 20.0);
+        assert_eq!(street(bound_m, [8, 0]), (2.0, CellSource::FilledStreet));
     }
     // What stands less than a storey above the ground of the quarter may be a yard.
     let yard = Street { roofs_m: [4.0, 10.5], bound_m: f32::NEG_INFINITY, only_roofs: true, ..NARROW_STREET };
