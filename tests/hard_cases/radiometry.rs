@@ -56,9 +56,15 @@ fn a_saturated_roof_is_right_or_void() {
                 inside.covered < 0.5 && stage.errors(&closed, 50.0, AlignmentMethod::None).over(white).covered == 1.0
             );
             // Voids that are closed on request are counted as filled, and nothing else changes.
-            assert!(before.observed == after.observed && before.filled + 1000 < after.filled, "{before:?} {after:?}");
+            assert!(
+                before.counts.observed == after.counts.observed && before.counts.filled + 1000 < after.counts.filled,
+                "{before:?} {after:?}"
+            );
             let open = stage.run(&shots, |config| config.fill = Fill::None).unwrap().report.surface;
-            assert!(before.observed == open.observed && before.filled > 0 && open.filled == 0, "{before:?} {open:?}");
+            assert!(
+                before.counts.observed == open.counts.observed && before.counts.filled > 0 && open.counts.filled == 0,
+                "{before:?} {open:?}"
+            );
         }
     }
 }

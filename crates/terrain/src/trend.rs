@@ -95,9 +95,19 @@ fn robust_step(points: &[Point], radius: f64, half_weight_m: f64) -> f32 {
             let off = if above > 0.0 { above } else { above / BELOW };
             share / (1.0 + (off / half_weight_m).powi(4))
         };
+        let last = plane;
         plane = fitted(points.iter().map(|point| (point.0, weight(*point))).chain(wider), 0.0);
+        if has_settled(last, plane, radius) {
+            break;
+        }
     }
     plane[0] as f32
+}
+
+/// Whether a plane moved by less than a tenth of a millimetre as far as it is fitted to.
+fn has_settled(last: [f64; 3], plane: [f64; 3], radius: f64) -> bool {
+    let [a, b, c] = [0, 1, 2].map(|i| (plane[i] - last[i]).abs());
+    a + radius * (b + c) < 1e-4
 }
 
 /// Returns a quantile of the heights of blocks of `side × side` cells, and the share of their cells

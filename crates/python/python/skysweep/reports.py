@@ -86,10 +86,10 @@ __all__ = [
     "HeightMapReport",
     "HeightMapTags",
     "Histogram",
-    "ImageCharacter",
     "ImageCorrection",
     "ImagePoint",
     "ImagePointing",
+    "ImageRadiometry",
     "ImageReport",
     "IndexImage",
     "InputFile",
@@ -2228,19 +2228,6 @@ class Histogram(Report):
     """Number of errors above +range."""
 
 
-class ImageCharacter(Report):
-    """Noise and contrast of one image, as measured in the windows of it that were read."""
-
-    noise: list[float]
-    """Standard deviation of the noise at full resolution, grey values, one per window."""
-
-    contrast: list[list[float]]
-    """Typical difference of neighbouring pixels, grey values, by level and window."""
-
-    has_contrast: bool
-    """Whether some window has pixels of different values."""
-
-
 class ImageCorrection(Report):
     """An affine map in image space, applied after the RPC: `corrected = p + t + D (p − centre)`.
     The translation holds at `centre`. Otherwise a small linear part would become a huge translation
@@ -2291,6 +2278,19 @@ class ImagePointing(Report):
     tie_residuals_px: list[list[float]]
     """Inliers, evenly chosen where there are many: sample, line, and residual along both after
     the correction, pixels."""
+
+
+class ImageRadiometry(Report):
+    """Noise and contrast of one image, as measured in the windows of it that were read."""
+
+    noise: list[float]
+    """Standard deviation of the noise at full resolution, grey values, one per window."""
+
+    contrast: list[list[float]]
+    """Typical difference of neighbouring pixels, grey values, by level and window."""
+
+    has_contrast: bool
+    """Whether some window has pixels of different values."""
 
 
 class ImageReport(Report):
@@ -2934,7 +2934,7 @@ class Plan(Report):
     images: list[SceneImage]
     """Images with corrected cameras."""
 
-    characters: list[ImageCharacter]
+    radiometry: list[ImageRadiometry]
     """Noise and contrast of the images."""
 
     grid: DsmGrid
@@ -2970,7 +2970,7 @@ class Plan(Report):
     warnings: list[str]
     """Warnings given so far."""
 
-    _parts = {"config": "DsmConfig", "images": "SceneImage", "characters": "ImageCharacter", "grid": "DsmGrid", "tuning": "SweepTuning", "chunks": "ChunkPlan", "report": "PlanReport", "choices": "Choice"}
+    _parts = {"config": "DsmConfig", "images": "SceneImage", "radiometry": "ImageRadiometry", "grid": "DsmGrid", "tuning": "SweepTuning", "chunks": "ChunkPlan", "report": "PlanReport", "choices": "Choice"}
 
 
 class PlanEstimate(Report):

@@ -161,8 +161,10 @@ fn ground_under(height_m: &Grid<f32>, trusted: &Grid<bool>, trend: &Grid<f32>, g
         found.expect("the cells and the default settings are valid, and nothing cancels").heights
     };
     // Each of the two is too high in places of its own: on roofs of slopes, and over hollows.
-    let by_planes_m = heights(bare_ground_of_observed(&seen, Some(&unobserved), gsd_m, &config, &Silent));
-    let by_openings_m = heights(bare_ground_by_openings(&seen, &unobserved, gsd_m, &config, &Silent));
+    let (by_planes_m, by_openings_m) = rayon::join(
+        || heights(bare_ground_of_observed(&seen, Some(&unobserved), gsd_m, &config, &Silent)),
+        || heights(bare_ground_by_openings(&seen, &unobserved, gsd_m, &config, &Silent)),
+    );
     let mut ground_m = combined(&by_planes_m, &by_openings_m, f32::min);
     let is_through = goes_through_roofs(&by_planes_m, height_m, trend, gsd_m);
     let cells = ground_m.data_mut().iter_mut().zip(trend.data()).zip(is_through.data());

@@ -5,8 +5,8 @@
 //! edge. The images show where the roof ends: the strongest change of grey lies further in than the
 //! jump of the heights.
 //!
-//! The first pixel outside the edge is left alone. Patches blur the edge by it on sharp images, too,
-//! where the surface on the grid is right.
+//! The first pixel outside the edge is left alone. Patches blur the edge by it on sharp images,
+//! too, where the surface on the grid is right.
 
 use raster::Grid;
 use rayon::prelude::*;
@@ -88,8 +88,8 @@ impl ImagedHeights<'_> {
 mod tests {
     use super::*;
 
-    /// Kept pixels of the row through a roof whose heights end at column 20, in an image in which it
-    /// ends at column `edge`.
+    /// Kept pixels of the row through a roof whose heights end at column 20, in an image in which
+    /// it ends at column `edge`.
     fn kept(edge: usize, contrast: f32, roof_m: impl Fn(usize) -> f32) -> Vec<usize> {
         let grid = |value: &dyn Fn(usize) -> f32| {
             Grid::from_vec(40, 40, (0..1600).map(|at| value(at % 40)).collect()).unwrap()
