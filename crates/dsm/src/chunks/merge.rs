@@ -54,7 +54,7 @@ pub(crate) struct Merger<'a> {
 /// Place of the cells until the files are made.
 enum Target<'a> {
     /// A scene that was computed at once stays in memory.
-    Whole(DsmFolder, Option<SurfaceRasters>),
+    Whole(DsmFolder, Option<Box<SurfaceRasters>>),
     /// The chunks of a large scene go to the disk.
     Chunked(ChunkedOutput<'a>),
 }
@@ -105,7 +105,7 @@ impl<'a> Merger<'a> {
                 self.findings.extend(&findings);
                 self.chunks.done += 1;
                 match &mut self.target {
-                    Target::Whole(_, place) => *place = Some(rasters),
+                    Target::Whole(_, place) => *place = Some(Box::new(rasters)),
                     Target::Chunked(output) => output.put(core, &rasters)?,
                 }
             }
