@@ -63,6 +63,16 @@ impl ImagedHeights<'_> {
         };
         let own = self.height_m[(x, y)];
         let jump_m = JUMP_M.max(JUMP_STEPS * self.step_m);
+        // Most pixels lie beside no jump.
+        let rows = self.height_m.data()[(y - REACH as usize) * self.height_m.width()..].chunks(self.height_m.width());
+        let mut lowest = f32::INFINITY;
+        for (line, row) in rows.take(2 * REACH as usize + 1).enumerate() {
+            let reach = if line == REACH as usize { REACH as usize } else { 0 };
+            lowest = row[x - reach..=x + reach].iter().copied().fold(lowest, f32::min);
+        }
+        if own - lowest <= jump_m {
+            return false;
+        }
         DIRECTIONS.into_iter().any(|direction| {
             let rise_from = |along: isize| own - self.height_m[place(along, 0, direction)];
             let Some(jump) = (1..=REACH).find(|along| rise_from(*along) > jump_m) else { return false };
