@@ -76,11 +76,11 @@ impl ChunkSurface {
 
     fn misfit_of_counts(&self, plan: &Plan) -> Option<Misfit> {
         let counts = &self.summary.counts;
-        let told = |cells: CellCounts| {
+        let described = |cells: CellCounts| {
             let CellCounts { observed, filled, void, masked, .. } = cells;
             format!("{observed} observed, {filled} filled, {void} void and {masked} masked cells")
         };
-        let (own, counted) = (told(counts.cells), told(CellCounts::of(&self.rasters)));
+        let (own, counted) = (described(counts.cells), described(CellCounts::of(&self.rasters)));
         if own != counted {
             return Some((own, counted));
         }

@@ -114,7 +114,7 @@ impl OpenChip {
             (Some(map), Some(wkt)) => {
                 ChipGround::Map(map.shifted(origin.sample, origin.line), MapProjection::from_definition(wkt)?)
             }
-            // A image without an RPC is compared as it is.
+            // An image without an RPC is compared as it is.
             _ => match io::rpc::read_for_image(&chip.path) {
                 Ok(found) => ChipGround::Camera(Box::new(RpcCamera::new(found.rpc).cropped(origin))),
                 Err(_) => ChipGround::Pixels,

@@ -192,13 +192,7 @@ pub fn make_surface(
                 let blank = own.view.blank(finest);
                 let mut keep = agreeing(own, &witnesses(own, &all, useful, &sweep.sources), level)?;
                 drop_at_rim(&mut keep, own.map, sweep.range, step_m);
-                let imaged = ImagedHeights {
-                    image: &own.view.levels[finest],
-                    noise: own.view.noise_at(finest),
-                    height_m: &own.map.height_m,
-                    step_m: step_m as f32,
-                };
-                imaged.drop_overreach(&mut keep);
+                ImagedHeights::of(own, finest, step_m).drop_overreach(&mut keep);
                 if let Some(asked) = options.height_range {
                     drop_outside(&mut keep, own.map, asked);
                 }

@@ -8,8 +8,13 @@
 //! The first pixel outside the edge is left alone. Patches blur the edge by it on sharp images,
 //! too, where the surface on the grid is right.
 
+use std::ops::RangeInclusive;
+
 use raster::Grid;
 use rayon::prelude::*;
+use sweep::consistency::Heights;
+
+use crate::surface::shadow_side::JUMP_STEPS;
 
 /// Pixels on each side of a jump that are compared: patches of 3 × 3 pixels whose costs are blended
 /// with those beside them reach two pixels over an edge.
@@ -18,8 +23,6 @@ const REACH: isize = 3;
 const BLUR: isize = 1;
 /// Least jump, metres: half a storey.
 const JUMP_M: f32 = 2.0;
-/// Least jump in steps of the sweep, of which heights are wrong by one or two.
-const JUMP_STEPS: f32 = 3.0;
 /// Change of grey at an edge, as a multiple of the largest one from the pixel to beyond the jump.
 const RATIO: f32 = 1.5;
 /// Change of grey at an edge, as a multiple of the noise.
@@ -30,16 +33,22 @@ const DIRECTIONS: [[isize; 2]; 4] = [[1, 0], [-1, 0], [0, 1], [0, -1]];
 /// The heights of a view's pixels and the image that they come from.
 #[derive(Clone, Copy)]
 pub(crate) struct ImagedHeights<'a> {
-    pub(crate) image: &'a Grid<f32>,
+    image: &'a Grid<f32>,
     /// Standard deviation of the noise, grey values.
-    pub(crate) noise: f32,
+    noise: f32,
     /// Height of each pixel, metres.
-    pub(crate) height_m: &'a Grid<f32>,
+    height_m: &'a Grid<f32>,
     /// Distance of two hypotheses, metres.
-    pub(crate) step_m: f32,
+    step_m: f32,
 }
 
-impl ImagedHeights<'_> {
+impl<'a> ImagedHeights<'a> {
+    /// Those of a view on a level with hypotheses `step_m` metres apart.
+    pub(crate) fn of(heights: Heights<'a>, level: usize, step_m: f64) -> Self {
+        let Heights { view, map, .. } = heights;
+        Self { image: &view.levels[level], noise: view.noise_at(level), height_m: &map.height_m, step_m: step_m as f32 }
+    }
+
     /// Takes the pixels that reach out over an edge from those that are kept.
     pub(crate) fn drop_overreach(&self, keep: &mut Grid<bool>) {
         let (width, height) = (keep.width(), keep.height());
@@ -87,7 +96,7 @@ impl ImagedHeights<'_> {
                 };
                 ((-1..=1).map(one).sum::<f32>() / 3.0).abs()
             };
-            let largest = |changes: std::ops::RangeInclusive<isize>| changes.map(change).fold(0.0, f32::max);
+            let largest = |changes: RangeInclusive<isize>| changes.map(change).fold(0.0, f32::max);
             let inner = largest(jump - 1 - REACH..=-1 - BLUR);
             inner > NOISES * self.noise && inner > RATIO * largest(-BLUR..=jump)
         })

@@ -23,7 +23,7 @@ const ACROSS_M: f64 = 2.0;
 /// Least jump, metres: a storey. The sun at 60° throws its shadow as far as the pixels compared.
 const JUMP_M: f32 = 3.0;
 /// Least jump in steps of the sweep, of which heights are wrong by one or two.
-const JUMP_STEPS: f32 = 3.0;
+pub(super) const JUMP_STEPS: f32 = 3.0;
 /// Share of the pixels that are called dark. Shadows cover 5 to 30 % of built-up ground.
 const DARK: f64 = 0.15;
 /// A view tells by at least this many jumps: the share of dark pixels at each of eight directions

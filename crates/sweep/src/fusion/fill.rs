@@ -106,9 +106,9 @@ const RIM_PART: f32 = 0.75;
 /// that a surface must have: fewer may be outliers.
 const AROUND: usize = 256;
 const LEAST_PART: usize = 10;
-/// Part of the known heights around a cell that lies at the ground where that goes on in a void: in
-/// the middle of a roof, and among crowns, none does.
-const GROUND_PART: f64 = 1.0 / 12.0;
+/// Part of the known heights around a cell that lies at the ground where that goes on in a void, as
+/// a divisor: in the middle of a roof, and among crowns, none does.
+const GROUND_PART: u32 = 12;
 /// Share of a quarter above which its voids are ground, also where none is seen: buildings hardly
 /// cover more of it.
 const MOSTLY: f64 = 2.0 / 3.0;
@@ -195,13 +195,13 @@ pub fn fill_voids(
 
 /// Marks the cells around which enough of the heights within `reach` cells lie at the ground.
 fn is_ground_near(height_m: &Grid<f32>, ground_m: &Grid<f32>, reach: usize) -> Grid<bool> {
-    let (count, width) = (height_m.data().len(), height_m.width());
-    let above_m = |i: usize| height_m.data()[i] - ground_m.data()[i];
-    let known = window_sums(count, width, reach, |i| f64::from(u8::from(!height_m.data()[i].is_nan())));
-    let at_ground = window_sums(count, width, reach, |i| f64::from(u8::from(above_m(i).abs() < ON_GROUND_M)));
+    let (heights, width) = (height_m.data(), height_m.width());
+    let counts = |is: &dyn Fn(usize) -> bool| window_sums(heights.len(), width, reach, |i| u32::from(is(i)));
+    let known = counts(&|i| !heights[i].is_nan());
+    let at_ground = counts(&|i| (heights[i] - ground_m.data()[i]).abs() < ON_GROUND_M);
     let mut out = height_m.map(|_| false);
-    let cells = out.data_mut().iter_mut().zip(known.iter().zip(&at_ground));
-    cells.for_each(|(is_near, (known, at_ground))| *is_near = *known > 0.0 && *at_ground >= GROUND_PART * known);
+    let cells = out.data_mut().iter_mut().zip(known.into_iter().zip(at_ground));
+    cells.for_each(|(is_near, (known, at_ground))| *is_near = known > 0 && GROUND_PART * at_ground >= known);
     out
 }
 
