@@ -179,7 +179,10 @@ fn score(map: &HeightMap, samples: &[Sample], side: i64, (dx, dy): (i64, i64), t
     let mut off: Vec<f32> = samples.iter().filter_map(difference).collect();
     off.sort_by(f32::total_cmp);
     let agreeing = densest(&off, 2.0 * tolerance_m, |middle_m| f64::from(middle_m.abs()) <= SEARCH_M)?;
-    let height_m = off[agreeing.start + agreeing.len() / 2];
+    let agreeing = &off[agreeing];
+    // Buildings that are wrong by nearly as much would draw the median to their side.
+    let closest = densest(agreeing, 0.5 * tolerance_m, |_| true)?;
+    let height_m = agreeing[closest.start + closest.len() / 2];
     let agreeing = agreeing.len() as f64 / samples.len() as f64;
     Some(Shift { x: dx * side, y: dy * side, height_m, agreeing })
 }
