@@ -218,6 +218,20 @@ mod tests {
     }
 
     #[test]
+    fn buildings_wrong_by_nearly_as_much_do_not_draw_the_model() {
+        let map = HeightMap { height_m: Grid::filled(10, 10, 0.0), ..HeightMap::empty(10, 10, 100.0) };
+        let samples: Vec<Sample> = (0..100u8)
+            .map(|i| {
+                let is_right = i < 60;
+                let off_m = if is_right { f32::from(i) / 75.0 - 0.4 } else { 2.0 + f32::from(i - 60) / 50.0 };
+                Sample { x: i64::from(i % 10), y: i64::from(i / 10), height_m: 100.0 - off_m }
+            })
+            .collect();
+        let placed = score(&map, &samples, 1, (0, 0), 1.75).unwrap();
+        assert!(placed.height_m.abs() < 0.05 && placed.agreeing == 1.0, "{placed:?}");
+    }
+
+    #[test]
     fn a_model_that_lies_elsewhere_is_moved_there() {
         let map = found((4, -6), 3.5, |_| true);
         let placed = boxes().placed(&map, 1, 0.5).unwrap();
