@@ -178,13 +178,12 @@ fn score(map: &HeightMap, samples: &[Sample], side: i64, (dx, dy): (i64, i64), t
         |s: &Sample| Some(found_at(map, s.x.div_euclid(side) + dx, s.y.div_euclid(side) + dy)? - s.height_m);
     let mut off: Vec<f32> = samples.iter().filter_map(difference).collect();
     off.sort_by(f32::total_cmp);
-    let agreeing = densest(&off, 2.0 * tolerance_m, |middle_m| f64::from(middle_m.abs()) <= SEARCH_M)?;
-    let agreeing = &off[agreeing];
-    // Buildings that are wrong by nearly as much would draw the median to their side.
-    let closest = densest(agreeing, 0.5 * tolerance_m, |_| true)?;
-    let height_m = agreeing[closest.start + closest.len() / 2];
-    let agreeing = agreeing.len() as f64 / samples.len() as f64;
-    Some(Shift { x: dx * side, y: dy * side, height_m, agreeing })
+    let agreeing = &off[densest(&off, 2.0 * tolerance_m, |middle_m| f64::from(middle_m.abs()) <= SEARCH_M)?];
+    // Half the tolerance is about a step of the level. Buildings that fit a height near by would
+    // draw the median of all that agree to their side.
+    let closest = &agreeing[densest(agreeing, 0.5 * tolerance_m, |_| true)?];
+    let share = agreeing.len() as f64 / samples.len() as f64;
+    Some(Shift { x: dx * side, y: dy * side, height_m: closest[closest.len() / 2], agreeing: share })
 }
 
 #[cfg(test)]
@@ -218,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn buildings_wrong_by_nearly_as_much_do_not_draw_the_model() {
+    fn a_model_is_placed_by_most_of_its_buildings_and_not_drawn_by_others() {
         let map = HeightMap { height_m: Grid::filled(10, 10, 0.0), ..HeightMap::empty(10, 10, 100.0) };
         let samples: Vec<Sample> = (0..100u8)
             .map(|i| {

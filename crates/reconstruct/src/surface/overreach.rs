@@ -73,11 +73,11 @@ impl<'a> ImagedHeights<'a> {
         let own = self.height_m[(x, y)];
         let jump_m = JUMP_M.max(JUMP_STEPS * self.step_m);
         // Most pixels lie beside no jump.
-        let rows = self.height_m.data()[(y - REACH as usize) * self.height_m.width()..].chunks(self.height_m.width());
+        let reach = REACH as usize;
         let mut lowest = f32::INFINITY;
-        for (line, row) in rows.take(2 * REACH as usize + 1).enumerate() {
-            let reach = if line == REACH as usize { REACH as usize } else { 0 };
-            lowest = row[x - reach..=x + reach].iter().copied().fold(lowest, f32::min);
+        for line in y - reach..=y + reach {
+            let across = if line == y { reach } else { 0 };
+            lowest = self.height_m.row(line)[x - across..=x + across].iter().copied().fold(lowest, f32::min);
         }
         if own - lowest <= jump_m {
             return false;
