@@ -1,6 +1,7 @@
 //! Tie points over the pairs of views and the joint correction of all cameras.
 
 use camera::RpcCamera;
+use geodesy::LonLatHeight;
 use reconstruct::{HeightRange, ImagePair};
 use serde::{Deserialize, Serialize};
 use sweep::SweepView;
@@ -64,7 +65,8 @@ impl PairTies {
 ///
 /// A few points of the first pair with enough ties narrow the height range of the others, and all
 /// its points that of the other pairs. A pair with fewer than `least` ties is searched again for a
-/// gross pointing error.
+/// gross pointing error. A pair on whose ground the views do not agree is searched again at the
+/// places that the other pairs show.
 pub(crate) fn match_pairs(
     views: &[SweepView],
     pairs: &[ImagePair],
@@ -130,7 +132,41 @@ pub(crate) fn match_pairs(
         out.push(found);
         done();
     }
+    search_again(views, &mut out, near, config, &even);
     out
+}
+
+/// Searches the pairs without patches on which the views agree again, at the places where the
+/// other pairs show the ground: shadows or a wide angle have left them few right corners, or none.
+fn search_again(
+    views: &[SweepView],
+    pairs: &mut [PairTies],
+    heights: HeightRange,
+    config: &TieConfig,
+    even: &[EvenView],
+) {
+    let known: Vec<PairTies> = pairs.iter().filter(|found| !found.patches.is_empty()).cloned().collect();
+    if known.is_empty() || known.len() == pairs.len() {
+        return;
+    }
+    let (adjusted, _) = adjust_views(views, &known, &shifts());
+    let place = |view: usize, ground: LonLatHeight| {
+        let camera = RpcCamera { rpc: views[view].camera.rpc.clone(), correction: adjusted.corrections[view] };
+        camera.project(ground).ok()
+    };
+    let heights = (heights.low_m, heights.high_m);
+    for found in pairs.iter_mut().filter(|found| found.patches.is_empty()) {
+        let ImagePair { first, second } = found.pair;
+        let expected = |&ground: &LonLatHeight| {
+            Some(Tie { reference: place(first, ground)?, source: place(second, ground)?, correlation: 1.0 })
+        };
+        let expected: Vec<Tie> = adjusted.ground.iter().flatten().filter_map(expected).collect();
+        let even = [&even[first], &even[second]];
+        if let Some(agreed) = agreement(&views[first], &views[second], &expected, heights, config, even) {
+            found.corners = std::mem::replace(&mut found.ties, agreed.patches.clone());
+            found.patches = agreed.patches;
+        }
+    }
 }
 
 /// Keeps the ties of a pair that one correction brings together: a wide search finds more chance
@@ -229,5 +265,49 @@ mod tie_rows {
             correlation,
         };
         Ok(Vec::<Row>::deserialize(input)?.into_iter().map(tie).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::config::DsmConfig;
+    use crate::images::image_pixels::read_views;
+    use crate::images::open::open;
+
+    /// A pair without corners gets ties at the places that the other two pairs show, unless its
+    /// views show something else there.
+    #[test]
+    fn a_pair_without_corners_is_searched_where_the_others_show_the_ground() {
+        let town = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../data-samples/town");
+        let paths = [1, 2, 3].map(|number| town.join(format!("view_{number}.tif")));
+        let images = open(&DsmConfig::new(paths.into(), "unused".into())).unwrap().images;
+        let views = read_views(&images, &|| ()).unwrap();
+        let range = HeightRange::new(100.0, 400.0);
+        let config = TieConfig::default();
+        let pairs = [(0, 1), (0, 2), (1, 2)].map(|(first, second)| ImagePair::new(first, second));
+        let matched = match_pairs(&views, &pairs, range, (&config, TIES_MIN), &|| ());
+        let heights = heights_seen(&views, &matched[0]).unwrap();
+        let searched = |views: &[SweepView]| {
+            let mut some = matched.clone();
+            some[2] = PairTies::new(pairs[2], Vec::new());
+            let even: Vec<EvenView> = views.iter().map(|_| EvenView::default()).collect();
+            search_again(views, &mut some, heights, &config, &even);
+            some
+        };
+        let found = searched(&views);
+        assert!(found[2].ties.len() > 5 * TIES_MIN, "{} ties", found[2].ties.len());
+        assert_eq!(found[2].ties, found[2].patches);
+        let (with, without) = (adjust_views(&views, &found, &shifts()), adjust_views(&views, &matched[..2], &shifts()));
+        let shift_px = |view: usize| {
+            let [a, b] = [&with.0, &without.0].map(|adjusted| adjusted.corrections[view].translation_px);
+            (a[0] - b[0]).hypot(a[1] - b[1])
+        };
+        assert!((0..3).all(|view| shift_px(view) < 0.5) && with.0.residual_px.1 < 0.5);
+        let mut turned = views.clone();
+        turned[2].levels.iter_mut().for_each(|level| level.data_mut().reverse());
+        assert!(searched(&turned)[2].ties.is_empty());
     }
 }

@@ -56,12 +56,12 @@ const MANY: f64 = 500.0;
 /// Errors change over the image when a plane holds this many times as many patches as a constant
 /// does. A smaller drift stays among the ties that count, and the adjustment sees it.
 const PLANE_TIMES: f64 = 1.2;
-/// Where at least one patch in this many agrees, the views show the same. Of chance likenesses one
-/// in twelve does: a pixel of the places across that are searched.
+/// At least one patch in this many agrees, or the views show nothing together. Of chance
+/// likenesses one in twelve does: a pixel of the places across that are searched.
 const AGREE_ONE_IN: usize = 4;
-/// Where fewer do, their number is this many standard deviations of chance likenesses beyond these.
-/// In five scenes planes of wrong places are up to seven beyond, as the densest of many.
-const BEYOND_CHANCE: f64 = 8.0;
+/// Of few patches a quarter may agree by chance, on the densest of many planes. Those that agree
+/// are this many standard deviations more than chance likenesses would be.
+const BEYOND_CHANCE: f64 = 5.0;
 /// Where at least one patch in this many agrees, the search was in the right place. Of 168 pairs in
 /// 20 scenes all of these were right within 0.45 px, and one of the 20 others was wrong by 7 px.
 const SURE_ONE_IN: usize = 3;
@@ -195,7 +195,7 @@ impl Found {
     /// Returns whether more patches lie on the plane than chance likenesses would.
     fn is_beyond_chance(&self) -> bool {
         let by_chance = self.patches.len() as f64 * 2.0 * self.plane.counts_px / f64::from(2 * REACH + 1);
-        self.is_one_in(AGREE_ONE_IN) || self.held as f64 >= by_chance + BEYOND_CHANCE * by_chance.sqrt()
+        self.is_one_in(AGREE_ONE_IN) && self.held as f64 >= by_chance + BEYOND_CHANCE * by_chance.sqrt()
     }
 
     /// Returns that of two on whose plane more patches lie; the first if as many do.
