@@ -136,8 +136,8 @@ pub(crate) fn match_pairs(
     out
 }
 
-/// Searches the pairs without patches on which the views agree again, at the places where the
-/// other pairs show the ground: shadows or a wide angle have left them few right corners, or none.
+/// Searches again those pairs on whose ground the views do not agree, at the places where the other
+/// pairs show it: shadows or a wide angle have left them few right corners, or none.
 fn search_again(
     views: &[SweepView],
     pairs: &mut [PairTies],
@@ -150,15 +150,14 @@ fn search_again(
         return;
     }
     let (adjusted, _) = adjust_views(views, &known, &shifts());
-    let place = |view: usize, ground: LonLatHeight| {
-        let camera = RpcCamera { rpc: views[view].camera.rpc.clone(), correction: adjusted.corrections[view] };
-        camera.project(ground).ok()
-    };
+    let corrected = |(view, &correction): (&SweepView, _)| RpcCamera { rpc: view.camera.rpc.clone(), correction };
+    let cameras: Vec<RpcCamera> = views.iter().zip(&adjusted.corrections).map(corrected).collect();
     let heights = (heights.low_m, heights.high_m);
     for found in pairs.iter_mut().filter(|found| found.patches.is_empty()) {
         let ImagePair { first, second } = found.pair;
         let expected = |&ground: &LonLatHeight| {
-            Some(Tie { reference: place(first, ground)?, source: place(second, ground)?, correlation: 1.0 })
+            let [reference, source] = [first, second].map(|view| cameras[view].project(ground).ok());
+            Some(Tie { reference: reference?, source: source?, correlation: 1.0 })
         };
         let expected: Vec<Tie> = adjusted.ground.iter().flatten().filter_map(expected).collect();
         let even = [&even[first], &even[second]];
