@@ -243,6 +243,7 @@ mod tests {
     use crate::testing::camera::leaning_camera;
     use crate::testing::plane::view_of_plane;
     use crate::view::SweepView;
+    use numeric::SplitMix64;
     use raster::Grid;
 
     fn config(aggregation: Aggregation) -> LevelConfig {
@@ -270,13 +271,34 @@ mod tests {
         let cameras = [[0.0, 0.0], [0.5, 0.1], [-0.3, 0.4]].map(|p| leaning_camera(120, p));
         for height_m in [7.0, 7.25, 7.5] {
             let views = cameras.clone().map(|c| view_of_plane(c, 120, height_m));
-            for aggregation in [Aggregation::Variance, Aggregation::BestOf(1)] {
+            for aggregation in [Aggregation::Variance, Aggregation::Best] {
                 let all = errors(&views, height_m, aggregation);
                 let rmse = (all.iter().map(|e| e * e).sum::<f64>() / all.len() as f64).sqrt();
                 // A step is half a pixel of parallax here.
                 assert!(rmse < 0.2, "RMSE {rmse} steps at {height_m} by {aggregation:?}");
             }
         }
+    }
+
+    #[test]
+    fn noise_is_averaged_over_the_views_where_it_hides_the_texture() {
+        let cameras = [[0.0, 0.0], [0.5, 0.1], [-0.3, 0.4], [0.2, -0.5], [-0.4, -0.2]];
+        let mut random = SplitMix64::new(1);
+        let noisy = |p| {
+            let camera = leaning_camera(120, p);
+            let mut image = view_of_plane(camera.clone(), 120, 7.3).levels.remove(0);
+            image.data_mut().iter_mut().for_each(|v| *v += 60.0 * random.normal() as f32);
+            SweepView::new(camera, image)
+        };
+        let views: Vec<SweepView> = cameras.into_iter().map(noisy).collect();
+        let share_right = |views: &[SweepView]| {
+            let all = errors(views, 7.3, Aggregation::Best);
+            all.iter().filter(|error| error.abs() < 2.0).count() as f64 / all.len() as f64
+        };
+        // Views that are said to have no noise are compared by their best pair alone.
+        let silent: Vec<SweepView> = views.iter().map(|v| SweepView { noise: 0.0, ..v.clone() }).collect();
+        let (averaged, best) = (share_right(&views), share_right(&silent));
+        assert!(averaged > 0.9 && best < 0.8, "{averaged} {best}");
     }
 
     fn swept(views: &[SweepView], order: &[usize]) -> HeightMap {
@@ -366,7 +388,7 @@ mod tests {
         let best = |order: &[usize]| {
             let ranges = Ranges::uniform(130, 130, 1.0, (-10.0, 30.0));
             let sources: Vec<ViewLevel<'_>> = order.iter().map(|&i| four[i].on_level(i, 0)).collect();
-            sweep_level(reference(&four, &ranges), &sources, 0.0, &config(Aggregation::BestOf(1))).unwrap()
+            sweep_level(reference(&four, &ranges), &sources, 0.0, &config(Aggregation::Best)).unwrap()
         };
         assert_eq!(bits(&best(&[1, 2])), bits(&best(&[1, 2, 3])));
     }

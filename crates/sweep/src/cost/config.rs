@@ -11,10 +11,11 @@ pub const COST_MAX: u8 = 112;
 pub enum Aggregation {
     /// Mean over all pairs of views, source–source pairs included: the variance over the views.
     Variance,
-    /// Mean of the best `K` reference–source pairs. With one pair a pixel needs a single source
-    /// that sees it on a similar date, which is the usual case beside a wall. A chance likeness of
-    /// two views is left to the consistency check.
-    BestOf(usize),
+    /// Mean of the best reference–source pairs: of one where the images show their texture, of more
+    /// where noise hides it. With one pair a pixel needs a single source that sees it on a similar
+    /// date, which is the usual case beside a wall. A chance likeness of two views is left to the
+    /// consistency check.
+    Best,
 }
 
 /// Parameters of the cost volume.
@@ -38,6 +39,6 @@ pub struct CostConfig {
 
 impl Default for CostConfig {
     fn default() -> Self {
-        Self { aggregation: Aggregation::BestOf(1), tile: 64, map_tolerance_px: 0.02, blends_neighbours: true }
+        Self { aggregation: Aggregation::Best, tile: 64, map_tolerance_px: 0.02, blends_neighbours: true }
     }
 }

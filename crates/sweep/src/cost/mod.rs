@@ -10,14 +10,15 @@
 //! The cost of a pair of views is the mean absolute difference of their features, 0 to 1. Pairs
 //! with a void count little. For hard bits the mean over all pairs of N views is the variance
 //! `2 N / (N − 1) · mean p (1 − p)`, with p the share of views that have a bit. The robust form
-//! averages only the best K of the reference–source pairs, so that occluded and changed views do
-//! not outvote the rest.
+//! averages only the best of the reference–source pairs, so that occluded and changed views do not
+//! outvote the rest. Their number follows from the noise of the images.
 //!
 //! Work goes by tiles of the reference. Each source is resampled over the tile once, through a
 //! local map (`geometry::LocalMap`); each height plane is then a sub-pixel shift of that
 //! image. Images are 16-bit integers in which 128 is the difference that counts fully; features
 //! and costs are bytes.
 
+mod averaged;
 mod census;
 mod config;
 mod division;

@@ -2,6 +2,7 @@
 
 use raster::{Grid, Window};
 
+use super::averaged::averaged_pairs;
 use super::census::{CHUNK, Census, overhang};
 use super::config::{Aggregation, COST_MAX, CostConfig};
 use super::division::{SweptPart, TILE_MIN, divide, halves, plane_span};
@@ -39,6 +40,8 @@ pub(crate) struct TileScratch {
     plane: PlaneScratch,
     /// Costs of one plane for each pair of views.
     pair_costs: Vec<Vec<u8>>,
+    /// Number of the pairs whose costs are averaged, the best ones.
+    averaged: usize,
     sums: Vec<u16>,
     weights: Vec<u16>,
     planes: Planes,
@@ -175,10 +178,14 @@ impl TileScratch {
             let heights = (f64::from(planes.0) * step, f64::from(planes.1 - 1) * step);
             warped.warp(source, *map, padded, heights, &mut self.grey);
         }
-        let pairs = match config.aggregation {
-            Aggregation::Variance => sources.len() * (sources.len() + 1) / 2,
-            Aggregation::BestOf(_) => sources.len(),
+        let (pairs, averaged) = match config.aggregation {
+            Aggregation::Variance => {
+                let all = sources.len() * (sources.len() + 1) / 2;
+                (all, all)
+            }
+            Aggregation::Best => (sources.len(), averaged_pairs(&reference.view, sources)),
         };
+        self.averaged = averaged;
         self.pair_costs.resize_with(pairs, Vec::new);
     }
 
@@ -256,11 +263,8 @@ impl TileScratch {
                 }
             }
         }
-        let used = match config.aggregation {
-            Aggregation::Variance => self.pair_costs.len(),
-            Aggregation::BestOf(k) => select_smallest(&mut self.pair_costs, k),
-        };
-        let used = &mut self.pair_costs[..used];
+        select_smallest(&mut self.pair_costs, self.averaged);
+        let used = &mut self.pair_costs[..self.averaged];
         if config.blends_neighbours {
             used.iter_mut().for_each(|costs| kernels::blend(costs, part.width, is_hidden, &mut self.sums));
         }
@@ -268,17 +272,14 @@ impl TileScratch {
     }
 }
 
-/// Moves the `k` smallest costs of every pixel to the first `k` pairs. Returns their number, at
-/// most that of the pairs.
-fn select_smallest(costs: &mut [Vec<u8>], k: usize) -> usize {
-    let k = k.clamp(1, costs.len());
+/// Moves the `k` smallest costs of every pixel to the first `k` pairs.
+fn select_smallest(costs: &mut [Vec<u8>], k: usize) {
     if k < costs.len() {
         for i in 0..k {
             let (head, tail) = costs.split_at_mut(i + 1);
             tail.iter_mut().for_each(|c| kernels::sort_pair(&mut head[i], c));
         }
     }
-    k
 }
 
 /// Copies a window of an image; outside the image it is NaN.
