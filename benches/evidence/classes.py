@@ -83,15 +83,15 @@ def judged(binaries, work, seed):
     if not surface(binaries["now"], sorted(folder.glob("view_*.tif")), folder / "run"):
         return dict(row, refused_surface=True)
     reference, heights = Reference(folder / "truth_dsm.tif"), read(folder / "run/dsm/dsm.tif")
-    reference.find_shift(*heights)
-    row["shift_m"] = [round(float(s), 2) for s in reference.shift]
+    shift = reference.find_shift(*heights)
+    row["shift_m"] = [round(float(s), 2) for s in shift]
     with rasterio.open(folder / "truth_buildings.tif") as file:
         truth = file.read(1)
     with rasterio.open(folder / "truth_class.tif") as file:
         jumps = file.read(1)
     for name, binary in binaries.items():
         found, words = classes(binary, folder / "run", folder / f"classes_{name}")
-        row[name] = {"refused": words} if found is None else dict(scores(reference.nearest(*found, reference.shift), truth, jumps, reference.nearest(*heights, reference.shift)), said=words)
+        row[name] = {"refused": words} if found is None else dict(scores(reference.nearest(*found, shift), truth, jumps, reference.nearest(*heights, shift)), said=words)
     return row
 
 

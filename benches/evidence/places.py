@@ -69,7 +69,6 @@ class Reference:
     def __init__(self, path):
         self.heights, self.transform, self.crs = read(path)
         self.heights[self.heights < -1000] = np.nan
-        self.shift = None
 
     def nearest(self, surface, transform, crs, shift, step=1):
         rows, columns = np.mgrid[0 : self.heights.shape[0] : step, 0 : self.heights.shape[1] : step]
@@ -93,7 +92,7 @@ class Reference:
                     errors = errors[np.isfinite(errors)]
                     tried.append((nmad(errors) if errors.size > 200 else np.inf, *shift))
             best = min(tried)
-        self.shift = best[1:]
+        return best[1:]
 
 
 def run(binary, images, options, folder):
@@ -104,8 +103,7 @@ def run(binary, images, options, folder):
 
 def measure(reference, folder, cpu_s, limit_m):
     surface, transform, crs = read(folder / "dsm" / "dsm.tif")
-    reference.find_shift(surface, transform, crs)
-    place = (transform, crs, reference.shift)
+    place = (transform, crs, reference.find_shift(surface, transform, crs))
     errors = reference.nearest(surface, *place) - reference.heights
     errors -= np.nanmedian(errors)
     source = reference.nearest(read(folder / "dsm" / "source.tif")[0], *place)
@@ -195,7 +193,8 @@ def main():
             both[label] = measure(reference, folder, cpu_s, limit_m)
             if name == PICTURED:
                 surface, transform, crs = read(folder / "dsm" / "dsm.tif")
-                surfaces.append(reference.nearest(surface, transform, crs, reference.shift))
+                shift = reference.find_shift(surface, transform, crs)
+                surfaces.append(reference.nearest(surface, transform, crs, shift))
         if name == PICTURED:
             parts = [pictures.hillshade(surface, reference.transform.a) for surface in surfaces]
             pictures.side_by_side(parts, (0.0, 1.0), ROOT / "docs/figures/only_roofs.png")
