@@ -15,6 +15,7 @@ use terrain::{
 };
 
 use crate::surface::fill::Fill;
+use crate::surface::hidden::drop_hidden;
 
 /// Isolated patches of less ground than a square of this side are speckle, metres: smaller than the
 /// crown of a single tree or a car port.
@@ -110,6 +111,8 @@ pub(crate) fn clean_up(
     let completed = take_unseen(fused);
     let before = known(&fused.height_m, core);
     drop_weak(fused, &trust, gsd_m);
+    let right = probability(fused, &trust);
+    drop_hidden(&mut fused.height_m, &right, voids.sights, trust.tolerance_m as f32);
     let speckle_cells = ((SPECKLE_SIDE_M / gsd_m).powi(2) as usize).max(SPECKLE_CELLS_MIN);
     remove_speckle(&mut fused.height_m, (2.0 * step_m).max(2.0 * gsd_m) as f32, speckle_cells);
     forget_agreement_of_voids(fused);

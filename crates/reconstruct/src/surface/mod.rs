@@ -4,6 +4,7 @@ pub(super) mod clean_up;
 pub(super) mod fill;
 mod grid_sight;
 pub(super) mod ground_mask;
+mod hidden;
 pub(super) mod make;
 mod overreach;
 pub(super) mod rasters;
