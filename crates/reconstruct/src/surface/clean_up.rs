@@ -57,7 +57,8 @@ const FILL_BLIND_M: f64 = 5.0;
 /// Distance to each side over which heights tell whether the ground around a void is known, metres:
 /// from the middle of a street over the houses beside it.
 const FILL_GROUND_M: f64 = 10.0;
-/// Distance to each side over which the share of voids is judged, metres: a few houses.
+/// Distance to each side over which the share of voids, and of heights that are right, is judged,
+/// metres: a few houses.
 const FILL_QUARTER_M: f64 = 30.0;
 /// Growth of the standard deviation of a filled height per metre to the nearest known one: ground
 /// rises and falls, and something small may stand there.
@@ -107,7 +108,13 @@ pub(crate) fn clean_up(
 ) -> (Grid<CellSource>, usize) {
     let Lengths { gsd_m, step_m, camera_m } = lengths;
     let reach_cells = (0.5 * SPECKLE_SIDE_M / gsd_m).round().max(1.0) as usize;
-    let trust = TrustConfig { step_m, tolerance_m: (2.0 * gsd_m).max(RIGHT_M), reach_cells, camera_m };
+    let trust = TrustConfig {
+        step_m,
+        tolerance_m: (2.0 * gsd_m).max(RIGHT_M),
+        reach_cells,
+        filled_reach_cells: (FILL_QUARTER_M / gsd_m).ceil() as usize,
+        camera_m,
+    };
     let completed = take_unseen(fused);
     let before = known(&fused.height_m, core);
     drop_weak(fused, &trust, gsd_m);
