@@ -15,7 +15,7 @@ use terrain::{
 };
 
 use crate::surface::fill::Fill;
-use crate::surface::hidden::drop_hidden;
+use crate::surface::hidden::{TRUSTED, drop_hidden};
 
 /// Isolated patches of less ground than a square of this side are speckle, metres: smaller than the
 /// crown of a single tree or a car port.
@@ -30,9 +30,6 @@ const RIGHT_MIN: f32 = 0.25;
 const RIGHT_MIN_AROUND: f32 = 0.4;
 /// Distance over which the heights around are judged, metres: half the width of a canal.
 const WATER_M: f64 = 10.0;
-/// Only heights that are hardly more often wrong than right hide the ground: a single wrong one
-/// would throw a long shadow. On weak surfaces most of the ground itself lies just below one half.
-const TRUSTED: f32 = 0.45;
 /// Patches of at least this many cells are never speckle, whatever the cell size.
 const SPECKLE_CELLS_MIN: usize = 9;
 /// Distance of known heights between which a void is filled, metres: a wide street or a house.

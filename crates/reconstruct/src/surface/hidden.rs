@@ -7,12 +7,15 @@
 use raster::{Grid, lowest};
 use sweep::fusion::{GridSight, occlusion_bounds};
 
-/// Heights of one class are hidden by those of higher ones only: of two heights that exclude each
-/// other, the more probable one stands. The first class are heights that are more often wrong than
-/// right; above the last one hardly any is wrong.
-const CLASSES: [f32; 4] = [0.0, 0.45, 0.6, 0.75];
-/// What hides another height reaches this many cells to each side: the edge of a roof is often
-/// found a cell too far out, where two views see past it to the ground.
+/// Only heights that are hardly more often wrong than right hide the ground: a single wrong one
+/// would throw a long shadow. On weak surfaces most of the ground itself lies just below one half.
+pub(super) const TRUSTED: f32 = 0.45;
+/// Bounds of classes of probability. Heights of one class are hidden by those of higher ones only:
+/// of two heights that exclude each other, the more probable one stands. Above the last bound
+/// hardly any is wrong.
+const CLASSES: [f32; 4] = [0.0, TRUSTED, 0.6, 0.75];
+/// A surface hides what lies behind it where it is as high this many cells to each side: the edge
+/// of a roof is often found a cell too far out, where two views see past it to the ground.
 const REACH: usize = 1;
 
 /// Drops the heights that lie more than `tolerance_m` below what more probable ones hide from all
