@@ -11,8 +11,8 @@ use sweep::fusion::{GridSight, occlusion_bounds};
 /// would throw a long shadow. On weak surfaces most of the ground itself lies just below one half.
 pub(super) const TRUSTED: f32 = 0.45;
 /// Bounds of classes of probability. Heights of one class are hidden by those of higher ones only:
-/// of two heights that exclude each other, the more probable one stands. Above the last bound
-/// hardly any is wrong.
+/// of two heights that exclude each other, the more probable one stands. Heights above the last
+/// bound are kept: most of them are right.
 const CLASSES: [f32; 4] = [0.0, TRUSTED, 0.6, 0.75];
 /// A surface hides what lies behind it where it is as high this many cells to each side: the edge
 /// of a roof is often found a cell too far out, where two views see past it to the ground.
