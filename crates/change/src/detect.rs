@@ -171,7 +171,7 @@ pub fn detect(input: &ChangeInput<'_>, config: &ChangeConfig) -> Result<Change, 
     check(input)?;
     let mut change = calibrated(input, config)?;
     let reach = (config.position_m / input.cell_m).round() as usize;
-    let observed_only = |grid: &Grid<f32>| masked(grid, input.observed);
+    let observed_only = |grid: &Grid<f32>| grid.without(|at| !is_observed(input, at));
     let left = unexplained(&observed_only(input.before), &observed_only(input.after), reach);
     let deviations = two_sided_quantile(1.0 - config.confidence) as f32;
     let mut signs = Grid::filled(left.width(), left.height(), 0i8);
@@ -294,8 +294,7 @@ fn probability_at(input: &ChangeInput<'_>, at: usize) -> f64 {
 /// Makes the rasters of differences with calibrated deviations; regions and correlation come later.
 fn calibrated(input: &ChangeInput<'_>, config: &ChangeConfig) -> Result<Change, Reason> {
     let (width, height) = (input.before.width(), input.before.height());
-    let mut difference = input.after.clone();
-    difference.data_mut().iter_mut().zip(input.before.data()).for_each(|(d, before)| *d -= before);
+    let difference = input.after.zip_map(input.before, |after, before| after - before);
     let usual = input.sigma.and_then(|sigma| {
         let mut known: Vec<f32> = sigma.data().iter().copied().filter(|s| s.is_finite() && *s > 0.0).collect();
         numeric::upper_median(&mut known)
@@ -343,16 +342,6 @@ fn calibrated(input: &ChangeInput<'_>, config: &ChangeConfig) -> Result<Change, 
 fn mean_square(grid: &Grid<f32>) -> f64 {
     let known = || grid.data().iter().filter(|s| s.is_finite());
     known().map(|s| f64::from(*s).powi(2)).sum::<f64>() / known().count().max(1) as f64
-}
-
-/// Returns the heights of observed cells, NaN elsewhere.
-fn masked(grid: &Grid<f32>, observed: Option<&Grid<bool>>) -> Grid<f32> {
-    let mut masked = grid.clone();
-    if let Some(observed) = observed {
-        let cells = masked.data_mut().iter_mut().zip(observed.data());
-        cells.filter(|(_, is_observed)| !**is_observed).for_each(|(height, _)| *height = f32::NAN);
-    }
-    masked
 }
 
 fn check(input: &ChangeInput<'_>) -> Result<(), Reason> {

@@ -319,6 +319,9 @@ pub struct SurfaceReport {
     /// Counts of them by what is known of their heights.
     #[serde(flatten)]
     pub counts: CellCounts,
+    /// Error below which a height counts as right, metres: in `expected_right` and in
+    /// `confidence.tif`.
+    pub right_within_m: f64,
     /// Share of each view's pixels with which another view agrees.
     pub kept_by_view: Vec<f64>,
     /// The same for each image in the order of the configuration; `None` for one that is no view.

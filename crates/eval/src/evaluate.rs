@@ -286,15 +286,11 @@ fn check(input: &EvalInput<'_>, config: &EvalConfig) -> Result<(), EvalError> {
 
 /// Returns the reference without the cells that the class or the mask excludes.
 fn counted(input: &EvalInput<'_>, skip: &[i32]) -> Grid<f32> {
-    let mut reference = input.reference.clone();
-    for (i, height) in reference.data_mut().iter_mut().enumerate() {
+    input.reference.without(|i| {
         let class = input.classes.and_then(|classes| *classes.data().get(i)?);
         let masked = input.mask.is_some_and(|mask| mask.data().get(i) == Some(&false));
-        if masked || class.is_some_and(|class| skip.contains(&class)) {
-            *height = f32::NAN;
-        }
-    }
-    reference
+        masked || class.is_some_and(|class| skip.contains(&class))
+    })
 }
 
 /// Horizontal shift, and the summary of the method that found it.

@@ -55,6 +55,26 @@ impl<T: Copy> Grid<T> {
     }
 }
 
+impl Grid<f32> {
+    /// Sets the cells whose index `is_void` accepts to NaN.
+    ///
+    /// ```
+    /// let mut heights = raster::Grid::filled(2, 1, 5.0f32);
+    /// heights.void_where(|i| i == 1);
+    /// assert!(heights.data()[0] == 5.0 && heights.data()[1].is_nan());
+    /// ```
+    pub fn void_where(&mut self, is_void: impl Fn(usize) -> bool) {
+        self.data.iter_mut().enumerate().filter(|(i, _)| is_void(*i)).for_each(|(_, value)| *value = f32::NAN);
+    }
+
+    /// Returns the grid with NaN in the cells whose index `is_void` accepts.
+    pub fn without(&self, is_void: impl Fn(usize) -> bool) -> Self {
+        let mut kept = self.clone();
+        kept.void_where(is_void);
+        kept
+    }
+}
+
 impl<T: PartialOrd> Grid<T> {
     /// Returns whether a cell that lies not on the border is above its eight neighbours.
     ///
@@ -117,6 +137,21 @@ impl<T> Grid<T> {
     /// Returns a grid of the same shape with `f` applied to every cell.
     pub fn map<U>(&self, f: impl FnMut(&T) -> U) -> Grid<U> {
         Grid { width: self.width, height: self.height, data: self.data.iter().map(f).collect() }
+    }
+
+    /// Returns a grid of what `f` makes of each cell and of the same cell of a grid of this size.
+    ///
+    /// ```
+    /// let [upper, lower] = [5.0, 3.0].map(|height_m| raster::Grid::filled(2, 2, height_m));
+    /// assert_eq!(upper.zip_map(&lower, |a, b| a - b).data(), [2.0; 4]);
+    /// ```
+    ///
+    /// # Panics
+    /// If the sizes differ.
+    pub fn zip_map<U, V>(&self, other: &Grid<U>, mut f: impl FnMut(&T, &U) -> V) -> Grid<V> {
+        assert_eq!((self.width, self.height), (other.width, other.height), "two grids of one size");
+        let data = self.data.iter().zip(&other.data).map(|(a, b)| f(a, b)).collect();
+        Grid { width: self.width, height: self.height, data }
     }
 }
 

@@ -45,6 +45,7 @@ pub use prior::findings::{BuildingFinding, PriorFindings, ViewVotes};
 pub use prior::view_prior::ViewPrior;
 pub use scene_sweep::{LatticeHeights, SceneHeights, SceneSweep, sweep_scene};
 pub use surface::clean_up::SURROUNDINGS_M;
+pub use surface::clean_up::right_within_m;
 pub use surface::fill::Fill;
 pub use surface::ground_mask::GroundMask;
 pub use surface::make::{CellCounts, KeptPixels, SurfaceCounts, SurfaceInput, SurfaceOptions, make_surface};

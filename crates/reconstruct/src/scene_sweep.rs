@@ -338,11 +338,7 @@ fn drop_lone_heights(
             }
             let counts = count_agreeing(*h, &others, level, &config)?;
             let mut out = h.map.clone();
-            for (height, n) in out.height_m.data_mut().iter_mut().zip(counts.agreeing.data()) {
-                if *n == 0 {
-                    *height = f32::NAN;
-                }
-            }
+            out.height_m.void_where(|i| counts.agreeing.data()[i] == 0);
             Ok(out)
         })
         .collect()

@@ -176,7 +176,5 @@ fn smoothed(heights: &Grid<f32>, radius: usize) -> Grid<f32> {
     let twice = |grid: &Grid<f32>| blurred(&blurred(grid, radius), radius);
     let sum = twice(&heights.map(|h| if h.is_nan() { 0.0 } else { *h }));
     let count = twice(&heights.map(|h| if h.is_nan() { 0.0 } else { 1.0 }));
-    let cells =
-        sum.data().iter().zip(count.data()).map(|(sum, count)| if *count > 1e-3 { sum / count } else { f32::NAN });
-    Grid::from_vec(heights.width(), heights.height(), cells.collect()).expect("one mean per cell")
+    sum.zip_map(&count, |sum, count| if *count > 1e-3 { sum / count } else { f32::NAN })
 }

@@ -109,8 +109,7 @@ fn running_mean(line: &[f32], radius: usize, mut put: impl FnMut(usize, f32)) {
 
 /// One surface above another.
 pub(crate) fn difference(upper: &Grid<f32>, lower: &Grid<f32>) -> Grid<f32> {
-    let cells = upper.data().iter().zip(lower.data()).map(|(upper, lower)| upper - lower);
-    Grid::from_vec(upper.width(), upper.height(), cells.collect()).expect("both surfaces have the same cells")
+    upper.zip_map(lower, |upper, lower| upper - lower)
 }
 
 /// Returns the slope of a surface without voids at each cell, as height per distance.
@@ -137,8 +136,7 @@ pub(crate) fn smooth_slopes(ground: &Grid<f32>, cell_m: f64) -> Grid<f32> {
 
 /// Returns the heights with the cells of a mask as voids.
 pub(crate) fn without_cells(heights: &Grid<f32>, mask: &Grid<bool>) -> Grid<f32> {
-    let cells = heights.data().iter().zip(mask.data()).map(|(&h, &is_void)| if is_void { f32::NAN } else { h });
-    Grid::from_vec(heights.width(), heights.height(), cells.collect()).expect("one flag per cell")
+    heights.without(|at| mask.data()[at])
 }
 
 /// Adds the cells of one mask to another.

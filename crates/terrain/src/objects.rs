@@ -66,11 +66,8 @@ pub(crate) fn objects(
 /// taken for ground. The opened surface would be too low on ridges, whose ground then stands out as
 /// objects do.
 fn without(surface: &Grid<f32>, objects: &Grid<bool>, doubtful: &Grid<bool>) -> Grid<f32> {
+    let ground = filled(&surface.without(|at| objects.data()[at] || doubtful.data()[at]));
     let mut out = surface.clone();
-    let unusable = objects.data().iter().zip(doubtful.data()).map(|(object, doubtful)| *object || *doubtful);
-    out.data_mut().iter_mut().zip(unusable).filter(|(_, is)| *is).for_each(|(cell, _)| *cell = f32::NAN);
-    let ground = filled(&out);
-    out.clone_from(surface);
     for ((cell, &ground), &is_object) in out.data_mut().iter_mut().zip(ground.data()).zip(objects.data()) {
         if is_object && !cell.is_nan() {
             *cell = ground;
@@ -147,6 +144,5 @@ pub(crate) fn radii(widest: f64) -> Vec<usize> {
 
 /// Cells at which one surface stands above another by more than `threshold_m`.
 fn above(upper: &Grid<f32>, lower: &Grid<f32>, threshold_m: f32) -> Grid<bool> {
-    let cells = upper.data().iter().zip(lower.data()).map(|(upper, lower)| upper - lower > threshold_m);
-    Grid::from_vec(upper.width(), upper.height(), cells.collect()).expect("both surfaces have the same cells")
+    upper.zip_map(lower, |upper, lower| upper - lower > threshold_m)
 }

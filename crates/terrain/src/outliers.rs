@@ -67,10 +67,8 @@ impl<'a> OffPlanes<'a> {
     pub(crate) fn no_ground(&self, clear: &Grid<f32>, objects: &Grid<bool>) -> Grid<bool> {
         self.settled(objects.clone(), |is_off| {
             let mut offset = self.offset(clear, &without_cells(clear, is_off));
-            let near_m = offset.near_m.data().iter();
-            let is_at = offset.above.data().iter().zip(near_m).map(|(above, near_m)| above.abs() <= *near_m);
-            let is_object = objects.data().iter().zip(is_at).map(|(is_object, is_at)| *is_object && !is_at).collect();
-            let mut found = Grid::from_vec(clear.width(), clear.height(), is_object).expect("one flag per cell");
+            let is_at = offset.above.zip_map(&offset.near_m, |above, near_m| above.abs() <= *near_m);
+            let mut found = objects.zip_map(&is_at, |is_object, is_at| *is_object && !is_at);
             offset.above = without_cells(&offset.above, objects);
             add(&mut found, &self.raised_parts(&offset));
             add(&mut found, &self.sunken_parts(&offset));
@@ -121,9 +119,7 @@ impl<'a> OffPlanes<'a> {
 
     /// The parts above the planes that are not near them.
     fn parts(&self, offset: &Offset) -> Regions {
-        let is_off = offset.above.data().iter().zip(offset.near_m.data()).map(|(above, near_m)| above > near_m);
-        let (width, height) = (offset.above.width(), offset.above.height());
-        Regions::of(&Grid::from_vec(width, height, is_off.collect()).expect("one flag per cell"))
+        Regions::of(&offset.above.zip_map(&offset.near_m, |above, near_m| above > near_m))
     }
 
     fn is_far(&self, parts: &Regions, part: usize, offset: &Offset) -> bool {

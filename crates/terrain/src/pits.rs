@@ -56,7 +56,7 @@ pub(crate) fn depth_m(noise_m: f64) -> f32 {
 /// cells with heights: one around a void beyond them would hold nothing but a pit at their border.
 fn closed(level: &Grid<f32>, radius: usize) -> Grid<f32> {
     let mut high = highest(level, radius);
-    high.data_mut().iter_mut().zip(level.data()).filter(|(_, h)| h.is_nan()).for_each(|(high, _)| *high = f32::NAN);
+    high.void_where(|at| level.data()[at].is_nan());
     lowest(&high, radius)
 }
 

@@ -77,8 +77,11 @@ impl ChunkSurface {
     fn misfit_of_counts(&self, plan: &Plan) -> Option<Misfit> {
         let counts = &self.summary.counts;
         let described = |cells: CellCounts| {
-            let CellCounts { observed, filled, void, masked, .. } = cells;
-            format!("{observed} observed, {filled} filled, {void} void and {masked} masked cells")
+            let CellCounts { observed, filled, void, masked, expected_right, .. } = cells;
+            format!(
+                "{observed} observed, {filled} filled, {void} void and {masked} masked cells, \
+                 {expected_right:.1} heights expected to be right"
+            )
         };
         let (own, counted) = (described(counts.cells), described(CellCounts::of(&self.rasters)));
         if own != counted {

@@ -67,8 +67,7 @@ pub(crate) fn void_masked(image: &SceneImage, window: Window, pixels: &mut Grid<
         return Ok(());
     }
     let masked = Places { window, size: (window.width, window.height) }.masked(image)?;
-    let pixels = pixels.data_mut().iter_mut().zip(masked.data()).filter(|(_, masked)| **masked);
-    pixels.for_each(|(pixel, _)| *pixel = f32::NAN);
+    pixels.void_where(|i| masked.data()[i]);
     Ok(())
 }
 

@@ -31,6 +31,7 @@ pub(crate) fn html(
 ) -> Result<String, PictureError> {
     let surface = &report.surface;
     let share = |n: usize| format!("{:.1} %", 100.0 * n as f64 / surface.cells.max(1) as f64);
+    let expected = surface.counts.expected_share().map_or("–".to_owned(), |share| format!("{:.0} %", 100.0 * share));
     let seconds: f64 = report.stages.iter().map(|stage| stage.seconds).sum();
     let name = config.output.file_name().unwrap_or_default().to_string_lossy();
     let pointing = &report.pointing;
@@ -51,6 +52,7 @@ pub(crate) fn html(
         cards: vec![
             (share(surface.counts.observed), "of the cells observed"),
             (share(surface.counts.filled), "filled, hatched on the maps"),
+            (expected, "of the heights expected to be right"),
             (median_text(maps.sigma()), "median σ of a height"),
             (format!("{:.2} px", pointing.residual_after_px), "residual of the tie points"),
             (format!("{seconds:.0} s"), "time"),

@@ -13,11 +13,15 @@ impl DsmReport {
             0 => String::new(),
             cells => format!(", of them {:.1} % masked", share(cells)),
         };
+        let expected = s.counts.expected_share().map_or(String::new(), |share| {
+            format!("expected   {:.0} % of the heights right within {:.1} m\n", 100.0 * share, s.right_within_m)
+        });
         let control = self.pointing.control.as_ref().map_or(String::new(), ControlReport::text);
         let seconds: f64 = self.stages.iter().map(|t| t.seconds).sum();
         format!(
             "DSM        {}\n\
              cells      {} ({:.1} % observed, {:.1} % filled, {:.1} % void{masked})\n\
+             {expected}\
              picture    {}\n\
              report     {}\n\
              time       {seconds:.1} s\n{control}",

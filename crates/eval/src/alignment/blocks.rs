@@ -239,13 +239,8 @@ fn sideways(
     let test = cut(test, &grown(bounds, RIM), start.map(|cells| -cells - RIM as isize), 0);
     let whole = cut(reference, bounds, [0; 2], RIM);
     let half = |colour: usize| {
-        let mut kept = whole.clone();
-        let width = kept.width();
-        for (at, height) in kept.data_mut().iter_mut().enumerate() {
-            if colour_of(bounds, [at % width, at / width].map(|at| at.saturating_sub(RIM))) != colour {
-                *height = f32::NAN;
-            }
-        }
+        let cell = |at: usize| [at % whole.width(), at / whole.width()];
+        let kept = whole.without(|at| colour_of(bounds, cell(at).map(|at| at.saturating_sub(RIM))) != colour);
         own_shift(&test, &kept, metres, FARTHEST_CELLS, measure)
             .map(|found| [0, 1].map(|axis| found[axis] + start[axis] as f64))
     };

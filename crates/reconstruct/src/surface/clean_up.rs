@@ -6,7 +6,7 @@
 use numeric::Silent;
 use raster::{Grid, Window};
 use sweep::fusion::{
-    CellSource, FillConfig, FillRule, FusedSurface, GridSight, KnownVoids, TrendConfig, Trust, TrustConfig, calibrate,
+    CellSource, FillConfig, FillRule, FusedSurface, GridSight, KnownVoids, TrendConfig, Trust, TrustConfig, TrustModel,
     fill_voids, ground_trend, occlusion_bounds, remove_speckle, surroundings,
 };
 use terrain::{
@@ -74,6 +74,11 @@ const RIGHT_M: f64 = 1.0;
 /// tower of more than 100 m: in a chunk the void then counts as seen at the far end of its shadow.
 pub const SURROUNDINGS_M: f64 = FILL_REACH_FAR_M + 2.0 * SPECKLE_SIDE_M;
 
+/// Returns the error below which a height counts as right, metres.
+pub fn right_within_m(gsd_m: f64) -> f64 {
+    (2.0 * gsd_m).max(RIGHT_M)
+}
+
 /// What is known about the voids of a surface.
 #[derive(Clone, Copy)]
 pub(crate) struct Voids<'a> {
@@ -105,30 +110,32 @@ pub(crate) fn clean_up(
 ) -> (Grid<CellSource>, usize) {
     let Lengths { gsd_m, step_m, camera_m } = lengths;
     let reach_cells = (0.5 * SPECKLE_SIDE_M / gsd_m).round().max(1.0) as usize;
-    let trust = TrustConfig {
+    let tolerance_m = right_within_m(gsd_m);
+    let config = TrustConfig {
         step_m,
-        tolerance_m: (2.0 * gsd_m).max(RIGHT_M),
+        tolerance_m,
         reach_cells,
         filled_reach_cells: (FILL_QUARTER_M / gsd_m).ceil() as usize,
         camera_m,
     };
+    let trust = TrustModel::new(fused, config);
     let completed = take_unseen(fused);
     let before = known(&fused.height_m, core);
     drop_weak(fused, &trust, gsd_m);
-    let right = probability(fused, &trust);
-    drop_hidden(&mut fused.height_m, &right, voids.sights, trust.tolerance_m as f32);
+    let right = trust.probability(fused);
+    drop_hidden(&mut fused.height_m, &right, voids.sights, tolerance_m as f32);
     let speckle_cells = ((SPECKLE_SIDE_M / gsd_m).powi(2) as usize).max(SPECKLE_CELLS_MIN);
     remove_speckle(&mut fused.height_m, (2.0 * step_m).max(2.0 * gsd_m) as f32, speckle_cells);
     forget_agreement_of_voids(fused);
     let observed = known(&fused.height_m, core);
-    let trusted = probability(fused, &trust).map(|p| *p >= TRUSTED);
+    let trusted = trust.probability(fused).map(|p| *p >= TRUSTED);
     let trend = ground_trend(&fused.height_m, &trusted, &trend_config(gsd_m));
     let bounds = |above_m: &Grid<f32>, cells: &[usize]| {
-        let height_m = combined(above_m, &trend, |above_m, ground_m| above_m + ground_m);
+        let height_m = above_m.zip_map(&trend, |above_m, ground_m| above_m + ground_m);
         let bounds = occlusion_bounds(&height_m, voids.sights, cells);
         bounds.into_iter().zip(cells).map(|(bound_m, cell)| bound_m - trend.data()[*cell]).collect()
     };
-    let above = |height_m: &Grid<f32>| combined(height_m, &trend, |height_m, ground_m| height_m - ground_m);
+    let above = |height_m: &Grid<f32>| height_m.zip_map(&trend, |height_m, ground_m| height_m - ground_m);
     let (mut above_m, completed) = (above(&fused.height_m), above(&completed));
     let (ground_m, only_roofs) = match voids.fill {
         Fill::None => (trusted.map(|_| f32::NAN), trusted.map(|_| false)),
@@ -148,7 +155,7 @@ pub(crate) fn clean_up(
         fused.sigma_m.data_mut()[i] = filled.sigma_m.data()[i];
     }
     let is_observed = |i: usize| !filled.source.data()[i].is_filled();
-    let Trust { sigma_m, probability } = calibrate(fused, is_observed, &trust);
+    let Trust { sigma_m, probability } = trust.calibrate(fused, is_observed);
     (fused.sigma_m, fused.confidence) = (sigma_m, probability);
     (filled.source, before - observed)
 }
@@ -159,9 +166,7 @@ pub(crate) fn clean_up(
 /// The ground tells how low a void may be. Voids are filled relative to the trend all the same:
 /// that is even, and the ground repeats the noise of the heights that it goes through.
 fn ground_under(height_m: &Grid<f32>, trusted: &Grid<bool>, trend: &Grid<f32>, gsd_m: f64) -> (Grid<f32>, Grid<bool>) {
-    let mut seen = height_m.clone();
-    let doubted = seen.data_mut().iter_mut().zip(trusted.data()).filter(|(_, is_trusted)| !**is_trusted);
-    doubted.for_each(|(height, _)| *height = f32::NAN);
+    let seen = height_m.without(|i| !trusted.data()[i]);
     let unobserved = seen.map(|h| h.is_nan());
     let config = GroundConfig::default();
     let heights = |found: Result<BareGround, TerrainError>| {
@@ -172,7 +177,7 @@ fn ground_under(height_m: &Grid<f32>, trusted: &Grid<bool>, trend: &Grid<f32>, g
         || heights(bare_ground_of_observed(&seen, Some(&unobserved), gsd_m, &config, &Silent)),
         || heights(bare_ground_by_openings(&seen, &unobserved, gsd_m, &config, &Silent)),
     );
-    let mut ground_m = combined(&by_planes_m, &by_openings_m, f32::min);
+    let mut ground_m = by_planes_m.zip_map(&by_openings_m, |a, b| a.min(*b));
     let is_through = goes_through_roofs(&by_planes_m, height_m, trend, gsd_m);
     let cells = ground_m.data_mut().iter_mut().zip(trend.data()).zip(is_through.data());
     cells.filter(|(_, is_through)| **is_through).for_each(|((ground_m, trend_m), _)| *ground_m = *trend_m);
@@ -180,39 +185,21 @@ fn ground_under(height_m: &Grid<f32>, trusted: &Grid<bool>, trend: &Grid<f32>, g
     (ground_m, only_roofs)
 }
 
-/// Returns the values that `of` makes of two grids of one size, cell by cell.
-fn combined(a: &Grid<f32>, b: &Grid<f32>, of: impl Fn(f32, f32) -> f32) -> Grid<f32> {
-    let mut out = a.clone();
-    out.data_mut().iter_mut().zip(b.data()).for_each(|(a, b)| *a = of(*a, *b));
-    out
-}
-
 /// Takes the heights that no view has seen out of a surface.
 fn take_unseen(fused: &mut FusedSurface) -> Grid<f32> {
-    let mut out = Grid::filled(fused.height_m.width(), fused.height_m.height(), f32::NAN);
-    let heights = fused.height_m.data_mut().iter_mut().zip(fused.seen.data());
-    for (out, (height, _)) in out.data_mut().iter_mut().zip(heights).filter(|(_, (_, seen))| !**seen) {
-        *out = std::mem::replace(height, f32::NAN);
-    }
+    let unseen = fused.height_m.without(|i| fused.seen.data()[i]);
+    fused.height_m.void_where(|i| !fused.seen.data()[i]);
     forget_agreement_of_voids(fused);
-    out
+    unseen
 }
 
 /// Drops the heights whose evidence is too weak.
-fn drop_weak(fused: &mut FusedSurface, trust: &TrustConfig, gsd_m: f64) {
-    let agreement = fused.height_m.data_mut().iter_mut().zip(fused.confidence.data());
-    agreement.filter(|(_, agreement)| **agreement < AGREEMENT_MIN).for_each(|(height, _)| *height = f32::NAN);
-    let right = probability(fused, trust);
+fn drop_weak(fused: &mut FusedSurface, trust: &TrustModel, gsd_m: f64) {
+    fused.height_m.void_where(|i| fused.confidence.data()[i] < AGREEMENT_MIN);
+    let right = trust.probability(fused);
     let around = surroundings(&right, (WATER_M / gsd_m).ceil() as usize);
-    let heights = fused.height_m.data_mut().iter_mut().zip(right.data().iter().zip(around.data()));
-    let is_weak = |right: f32, around: f32| right < RIGHT_MIN && around < RIGHT_MIN_AROUND;
-    heights.filter(|(_, (right, around))| is_weak(**right, **around)).for_each(|(height, _)| *height = f32::NAN);
+    fused.height_m.void_where(|i| right.data()[i] < RIGHT_MIN && around.data()[i] < RIGHT_MIN_AROUND);
     forget_agreement_of_voids(fused);
-}
-
-/// Returns the probability that each height is right, before anything is filled.
-fn probability(fused: &FusedSurface, trust: &TrustConfig) -> Grid<f32> {
-    calibrate(fused, |_| true, trust).probability
 }
 
 fn forget_agreement_of_voids(fused: &mut FusedSurface) {

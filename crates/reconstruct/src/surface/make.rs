@@ -31,6 +31,8 @@ const TEAR_SLOPE: f64 = 2.75;
 /// Views whose heights a view is compared with, where there are more and those that it was matched
 /// with are no more. The time of the comparison would grow with the square of the number of views.
 const WITNESSES_MAX: usize = 12;
+/// Parts of one that a probability is rounded to, a power of two: sums are the same in any order.
+const PARTS: f64 = 1024.0;
 /// Reach of the patch that the cost of a pixel sees, pixels.
 const PATCH_REACH: usize = 2;
 
@@ -73,7 +75,7 @@ pub struct SurfaceInput<'a> {
 }
 
 /// Counts of cells.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct CellCounts {
     /// Number of cells with an observed height.
     pub observed: usize,
@@ -90,10 +92,13 @@ pub struct CellCounts {
     pub streets: usize,
     /// Number of cells removed as speckle.
     pub speckle_removed: usize,
+    /// Number of heights, observed and filled, that are expected to be right within
+    /// [`crate::right_within_m`]: the sum of their probabilities.
+    pub expected_right: f64,
 }
 
 /// Counts of cells and pixels.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SurfaceCounts {
     /// Cells of the surface.
@@ -119,6 +124,7 @@ impl CellCounts {
     /// Counts the cells of rasters. What was removed from them is not known.
     pub fn of(rasters: &SurfaceRasters) -> Self {
         let count = |grid: &Grid<u8>, value: u8| grid.data().iter().filter(|v| **v == value).count();
+        let right = rasters.confidence.data().iter().filter(|p| !p.is_nan());
         Self {
             observed: count(&rasters.filled, OBSERVED),
             filled: count(&rasters.filled, FILLED),
@@ -126,7 +132,15 @@ impl CellCounts {
             masked: count(&rasters.source, CellSource::Masked.code()),
             streets: count(&rasters.source, CellSource::FilledStreet.code()),
             speckle_removed: 0,
+            expected_right: right.map(|p| (f64::from(*p) * PARTS).round() / PARTS).sum(),
         }
+    }
+
+    /// Returns the share of the heights, observed and filled, that are expected to be right within
+    /// [`crate::right_within_m`], 0 to 1; `None` without any height.
+    pub fn expected_share(&self) -> Option<f64> {
+        let heights = self.observed + self.filled;
+        (heights > 0).then(|| self.expected_right / heights as f64)
     }
 
     fn add(&mut self, other: &Self) {
@@ -136,6 +150,7 @@ impl CellCounts {
         self.masked += other.masked;
         self.streets += other.streets;
         self.speckle_removed = self.speckle_removed.saturating_add(other.speckle_removed);
+        self.expected_right += other.expected_right;
     }
 }
 
@@ -247,8 +262,10 @@ fn fuse(
     drop(placed);
     if let Some(mask) = mask {
         // They are not trusted, and must not fill what is beside them.
-        let heights = fused.height_m.data_mut().iter_mut().zip(fused.confidence.data_mut()).zip(mask.masked.data());
-        heights.filter(|(_, masked)| **masked).for_each(|(cell, _)| (*cell.0, *cell.1) = (f32::NAN, 0.0));
+        let is_masked = |i: usize| mask.masked.data()[i];
+        fused.height_m.void_where(is_masked);
+        let confidence = fused.confidence.data_mut().iter_mut().enumerate();
+        confidence.filter(|(i, _)| is_masked(*i)).for_each(|(_, confidence)| *confidence = 0.0);
     }
     let sights = grid_sights(pixels, grid, &fused.height_m, origin_m)?;
     let lengths = Lengths { gsd_m: grid.gsd_m, step_m, camera_m: input.camera_m };

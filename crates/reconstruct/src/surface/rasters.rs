@@ -15,7 +15,7 @@ pub struct SurfaceRasters {
     pub sigma_m: Grid<f32>,
     /// Number of views that observed the height.
     pub views: Grid<u8>,
-    /// Probability that the height is right, 0 to 1, see [`sweep::fusion::calibrate`].
+    /// Probability that the height is right, 0 to 1, see [`sweep::fusion::TrustModel`].
     pub confidence: Grid<f32>,
     /// 1 where a height was filled, 0 where it was observed, 255 in voids.
     pub filled: Grid<u8>,

@@ -89,8 +89,7 @@ fn steps(config: &ClassesConfig, progress: &dyn Progress) -> Result<ClassesRepor
         progress.check_cancelled()?;
         let ground_share = checked_ground(&surface, &ground, progress)?;
         let (weak, layers) = weak_cells(&surface)?;
-        let mut above = surface.heights.clone();
-        above.data_mut().iter_mut().zip(ground.heights.data()).for_each(|(cell, ground)| *cell -= ground);
+        let above = surface.heights.zip_map(&ground.heights, |cell, ground| cell - ground);
         let mut input = ClassifyInput {
             surface: &surface.heights,
             above_ground: &above,

@@ -147,6 +147,7 @@ fn co_registered(
     before: Option<&Grid<bool>>,
     after: Option<&Grid<bool>>,
 ) -> Result<Movement, DiffError> {
+    let observed_of = |heights: &Grid<f32>, observed: &Grid<bool>| heights.without(|i| !observed.data()[i]);
     let test = after.map_or_else(|| inputs.test.heights.clone(), |mask| observed_of(&inputs.test.heights, mask));
     let mut settings = EvalConfig::default();
     (settings.alignment, settings.search_m) = (config.alignment, config.search_m);
@@ -181,14 +182,6 @@ fn co_registered(
     let movement = Movement { shift, cells: metres.cells(shift.dx_m, shift.dy_m), local };
     inputs.notes.extend(note.map(str::to_owned));
     Ok(movement)
-}
-
-/// Returns heights without those of cells that are not observed.
-fn observed_of(heights: &Grid<f32>, observed: &Grid<bool>) -> Grid<f32> {
-    let mut kept = heights.clone();
-    let cells = kept.data_mut().iter_mut().zip(observed.data());
-    cells.filter(|(_, observed)| !**observed).for_each(|(height, _)| *height = f32::NAN);
-    kept
 }
 
 /// Combines the deviations of both surfaces. A surface without a raster of deviations has the

@@ -231,13 +231,7 @@ fn half() -> usize {
 
 /// Returns a chip without the cells that a picture of the same cells does not show.
 fn where_seen(chip: &Grid<f32>, seen: &Grid<f32>) -> Grid<f32> {
-    let mut out = chip.clone();
-    for (out, seen) in out.data_mut().iter_mut().zip(seen.data()) {
-        if !seen.is_finite() {
-            *out = f32::NAN;
-        }
-    }
-    out
+    chip.without(|i| !seen.data()[i].is_finite())
 }
 
 /// Returns how far from the middle of chips, in cells of the grid, the picture of the image shows

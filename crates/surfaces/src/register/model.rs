@@ -137,12 +137,11 @@ impl Model {
             MapSplatCamera::new(&surface).ok_or_else(|| RegisterError::NoHeights { path: path.to_owned() })?;
         let seen = splats::render(&file.splats, &from_above)?;
         let heights = seen.median_height_m.map(|height| (f64::from(*height) + origin.origin[2]) as f32);
-        let grey = seen.colour.data().iter().zip(seen.coverage.data()).map(|(colour, covered)| {
+        let picture = seen.colour.zip_map(&seen.coverage, |colour, covered| {
             if *covered < COVERED { f32::NAN } else { colour.iter().sum::<f32>() / (3.0 * covered) }
         });
-        let picture = Grid::from_vec(heights.width(), heights.height(), grey.collect());
         let mut model = Self::on(heights, geotransform, projection, path)?;
-        model.looks = Looks::Picture(picture.unwrap_or_else(|| Grid::filled(0, 0, f32::NAN)));
+        model.looks = Looks::Picture(picture);
         Ok(model)
     }
 

@@ -147,12 +147,8 @@ pub fn fill_voids(
     let voids: Vec<usize> = (0..height_m.data().len()).filter(|&i| height_m.data()[i].is_nan()).collect();
     let mut source = Grid::filled(width, height, CellSource::Observed);
     let mut sigma_m = Grid::filled(width, height, f32::NAN);
-    let keep_trusted = |heights: &mut Grid<f32>| {
-        let cells = heights.data_mut().iter_mut().zip(trusted.data());
-        cells.filter(|(_, is_trusted)| !**is_trusted).for_each(|(height, _)| *height = f32::NAN);
-    };
-    let mut solid = height_m.clone();
-    keep_trusted(&mut solid);
+    let is_doubted = |i: usize| !trusted.data()[i];
+    let solid = height_m.without(is_doubted);
     let bounds = bound_m(&solid, &voids);
     let mut sources = height_m.clone();
     remove_speckle(&mut sources, f32::INFINITY, config.island_cells);
@@ -162,7 +158,7 @@ pub fn fill_voids(
     islands.for_each(|(source, solid)| *source = *solid);
     let around = around(&sources, blind, &voids, config.reach_cells as f32);
     let (numbers, count) = number_voids(height_m);
-    keep_trusted(&mut sources);
+    sources.void_where(is_doubted);
     let border = Border::new(&sources, &numbers);
     let planes = border_planes(border.cells(), count, config.same_surface_m);
     let is_ground_near = is_ground_near(height_m, ground_m, config.ground_reach_cells);

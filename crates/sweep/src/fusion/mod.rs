@@ -27,4 +27,4 @@ pub use mesh::{GridFrame, PlacedView, mark_cells, place_view};
 pub use source::{CellSource, FILLED, OBSERVED, VOID};
 pub use speckle::remove_speckle;
 pub use trend::{TrendConfig, ground_trend};
-pub use trust::{Trust, TrustConfig, calibrate, surroundings};
+pub use trust::{Trust, TrustConfig, TrustModel, surroundings};

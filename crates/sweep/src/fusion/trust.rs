@@ -45,8 +45,9 @@ const ODDS_TOLERANCE: f64 = 1.35;
 /// with the weight of the root of its filled cells. The deviation tells nothing more.
 const FILLED_ODDS: f64 = 1.5;
 /// Mean probability of the observed heights around a filled cell, with voids as 0, from which on
-/// more tells nothing, and below which less tells nothing.
+/// more tells nothing.
 const ENOUGH_AROUND: f64 = 0.5;
+/// The same mean below which less tells nothing.
 const NOTHING_AROUND: f64 = 0.03;
 
 /// Parameters of the calibration.
@@ -75,14 +76,12 @@ pub struct Trust {
     pub probability: Grid<f32>,
 }
 
-/// Returns calibrated deviations of the heights of a fused surface, and the probability of each to
-/// be right. Heights that were not observed keep the deviation that the surface has for them; their
-/// agreement, the `confidence` of the surface, must be 0. The deviation of the cameras enters the
-/// deviations only: it is much smaller than the tolerance.
+/// Tells how far the heights of one surface are to be trusted, also after some of them were dropped
+/// or filled.
 ///
 /// ```
 /// use raster::Grid;
-/// use sweep::fusion::{FusedSurface, TrustConfig, calibrate};
+/// use sweep::fusion::{FusedSurface, TrustConfig, TrustModel};
 ///
 /// let height_m = Grid::filled(9, 9, 5.0f32);
 /// let surface = FusedSurface {
@@ -95,40 +94,63 @@ pub struct Trust {
 /// };
 /// let config =
 ///     TrustConfig { step_m: 0.5, tolerance_m: 1.0, reach_cells: 3, filled_reach_cells: 8, camera_m: 0.0 };
-/// let trust = calibrate(&surface, |_| true, &config);
+/// let trust = TrustModel::new(&surface, config).calibrate(&surface, |_| true);
 /// assert!(trust.probability[(4, 4)] > 0.95 && trust.sigma_m[(4, 4)] < 0.5);
 /// ```
-pub fn calibrate(surface: &FusedSurface, is_observed: impl Fn(usize) -> bool, config: &TrustConfig) -> Trust {
-    let heights = surface.height_m.data();
-    let agreed = window_means(heights.len(), surface.height_m.width(), config.reach_cells, |i| {
-        if heights[i].is_nan() { 0.0 } else { f64::from(surface.confidence.data()[i]) }
-    });
-    let roughness_m = roughness(&surface.single_m);
-    let in_steps = |value_m: f32| (f64::from(value_m) / config.step_m).max(RATIO_MIN).ln();
-    let mut sigma_m = surface.sigma_m.clone();
-    let mut probability = surface.height_m.map(|_| f32::NAN);
-    let known = || (0..heights.len()).filter(|i| !heights[*i].is_nan());
-    for i in known().filter(|i| is_observed(*i)) {
-        let sigma = &mut sigma_m.data_mut()[i];
-        let log = SIGMA_BASE
-            + SIGMA_SHARPNESS * in_steps(*sigma)
-            + SIGMA_ROUGHNESS * in_steps(roughness_m.data()[i])
-            + SIGMA_AGREEMENT * (UNOBSERVED + agreed[i]) / (UNOBSERVED + 1.0)
-            + SIGMA_VIEWS * f64::from(surface.views.data()[i].max(1)).ln();
-        *sigma = (config.step_m * log.exp()) as f32;
-        let ratio = (config.tolerance_m / f64::from(*sigma).max(f64::MIN_POSITIVE)).ln();
-        probability.data_mut()[i] = logistic(ODDS_BASE + ODDS_TOLERANCE * ratio);
-        *sigma = f64::from(*sigma).hypot(config.camera_m) as f32;
+#[derive(Debug)]
+pub struct TrustModel {
+    config: TrustConfig,
+    /// Roughness of the heights of single views, metres.
+    roughness_m: Grid<f32>,
+}
+
+impl TrustModel {
+    /// Measures the roughness of a fused surface by its `single_m`.
+    pub fn new(surface: &FusedSurface, config: TrustConfig) -> Self {
+        Self { config, roughness_m: roughness(&surface.single_m) }
     }
-    let filled: Vec<usize> = known().filter(|i| !is_observed(*i)).collect();
-    if !filled.is_empty() {
-        let around = surroundings(&probability, config.filled_reach_cells);
-        for i in filled {
-            let share = f64::from(around.data()[i]).clamp(NOTHING_AROUND, ENOUGH_AROUND) / ENOUGH_AROUND;
-            probability.data_mut()[i] = logistic((FILLED_ODDS * share).ln());
+
+    /// Returns the probability that each height is right, where all are observed.
+    pub fn probability(&self, surface: &FusedSurface) -> Grid<f32> {
+        self.calibrate(surface, |_| true).probability
+    }
+
+    /// Returns calibrated deviations of the heights, and the probability of each to be right.
+    /// Heights that were not observed keep the deviation that the surface has for them; their
+    /// agreement, the `confidence` of the surface, must be 0. The deviation of the cameras enters
+    /// the deviations only: it is much smaller than the tolerance.
+    pub fn calibrate(&self, surface: &FusedSurface, is_observed: impl Fn(usize) -> bool) -> Trust {
+        let config = &self.config;
+        let heights = surface.height_m.data();
+        let agreed = window_means(heights.len(), surface.height_m.width(), config.reach_cells, |i| {
+            if heights[i].is_nan() { 0.0 } else { f64::from(surface.confidence.data()[i]) }
+        });
+        let in_steps = |value_m: f32| (f64::from(value_m) / config.step_m).max(RATIO_MIN).ln();
+        let mut sigma_m = surface.sigma_m.clone();
+        let mut probability = surface.height_m.map(|_| f32::NAN);
+        let known = || (0..heights.len()).filter(|i| !heights[*i].is_nan());
+        for i in known().filter(|i| is_observed(*i)) {
+            let sigma = &mut sigma_m.data_mut()[i];
+            let log = SIGMA_BASE
+                + SIGMA_SHARPNESS * in_steps(*sigma)
+                + SIGMA_ROUGHNESS * in_steps(self.roughness_m.data()[i])
+                + SIGMA_AGREEMENT * (UNOBSERVED + agreed[i]) / (UNOBSERVED + 1.0)
+                + SIGMA_VIEWS * f64::from(surface.views.data()[i].max(1)).ln();
+            *sigma = (config.step_m * log.exp()) as f32;
+            let ratio = (config.tolerance_m / f64::from(*sigma).max(f64::MIN_POSITIVE)).ln();
+            probability.data_mut()[i] = logistic(ODDS_BASE + ODDS_TOLERANCE * ratio);
+            *sigma = f64::from(*sigma).hypot(config.camera_m) as f32;
         }
+        let filled: Vec<usize> = known().filter(|i| !is_observed(*i)).collect();
+        if !filled.is_empty() {
+            let around = surroundings(&probability, config.filled_reach_cells);
+            for i in filled {
+                let share = f64::from(around.data()[i]).clamp(NOTHING_AROUND, ENOUGH_AROUND) / ENOUGH_AROUND;
+                probability.data_mut()[i] = logistic((FILLED_ODDS * share).ln());
+            }
+        }
+        Trust { sigma_m, probability }
     }
-    Trust { sigma_m, probability }
 }
 
 fn logistic(log_odds: f64) -> f32 {
@@ -173,6 +195,10 @@ mod tests {
     const CONFIG: TrustConfig =
         TrustConfig { step_m: 0.5, tolerance_m: 1.0, reach_cells: 3, filled_reach_cells: 8, camera_m: 0.0 };
 
+    fn calibrated(surface: &FusedSurface, is_observed: impl Fn(usize) -> bool) -> Trust {
+        TrustModel::new(surface, CONFIG).calibrate(surface, is_observed)
+    }
+
     /// A level surface of three views that agree.
     fn level((width, height): (usize, usize)) -> FusedSurface {
         let height_m = Grid::filled(width, height, 5.0f32);
@@ -197,7 +223,7 @@ mod tests {
         surface.single_m = surface.height_m.clone();
         let filled = 12 * 40 + 4;
         surface.sigma_m.data_mut()[filled] = 2.5;
-        let Trust { sigma_m, probability } = calibrate(&surface, |i| i != filled, &CONFIG);
+        let Trust { sigma_m, probability } = calibrated(&surface, |i| i != filled);
         assert!(probability[(20, 10)].is_nan());
         let [smooth, alone, rough] = [(16, 3), (2, 3), (36, 10)];
         assert!(sigma_m[smooth] < sigma_m[rough] && sigma_m[rough] < sigma_m[alone]);
@@ -214,7 +240,7 @@ mod tests {
             (40..80).filter(|x| x % 8 > 1 || y % 8 > 1).for_each(|x| surface.confidence[(x, y)] = 0.0);
         }
         let is_observed = |i: usize| surface.confidence.data()[i] > 0.0 && i != 10 * 80 + 20;
-        let Trust { probability, .. } = calibrate(&surface, is_observed, &CONFIG);
+        let Trust { probability, .. } = calibrated(&surface, is_observed);
         let [in_street, between_houses] = [(20, 10), (60, 10)].map(|at| probability[at]);
         assert!((0.55..0.65).contains(&in_street), "{in_street}");
         assert!(between_houses < 0.3, "{between_houses}");
@@ -225,15 +251,16 @@ mod tests {
         let sigma_of = |views: u8| {
             let mut surface = level((9, 9));
             surface.views = surface.views.map(|_| views);
-            calibrate(&surface, |_| true, &CONFIG).sigma_m[(4, 4)]
+            calibrated(&surface, |_| true).sigma_m[(4, 4)]
         };
         assert!(sigma_of(2) < sigma_of(3) && sigma_of(3) < sigma_of(12));
     }
 
     #[test]
     fn what_the_cameras_leave_adds_to_the_deviation_of_observed_heights() {
-        let calibrated = |camera_m: f64| calibrate(&level((9, 9)), |i| i != 0, &TrustConfig { camera_m, ..CONFIG });
-        let (exact, off) = (calibrated(0.0), calibrated(0.3));
+        let surface = level((9, 9));
+        let model = |camera_m: f64| TrustModel::new(&surface, TrustConfig { camera_m, ..CONFIG });
+        let [exact, off] = [0.0, 0.3].map(|camera_m| model(camera_m).calibrate(&surface, |i| i != 0));
         assert!((off.sigma_m[(4, 4)] - exact.sigma_m[(4, 4)].hypot(0.3)).abs() < 1e-6);
         assert_eq!((off.sigma_m[(0, 0)], off.probability), (exact.sigma_m[(0, 0)], exact.probability));
     }
@@ -249,17 +276,17 @@ mod tests {
 
     #[test]
     fn the_model_knows_no_unit_but_the_height_step() {
-        let calibrated = |scale: f32| {
+        let scaled = |scale: f32| {
             let mut surface = level((12, 12));
             let heights = (0..144).map(|i| scale * ((i * 37 % 11) as f32 * 0.1));
             surface.height_m = Grid::from_vec(12, 12, heights.collect()).unwrap();
             surface.single_m = surface.height_m.clone();
             surface.sigma_m = surface.sigma_m.map(|sigma_m| sigma_m * scale);
             let config = TrustConfig { step_m: 0.5 * f64::from(scale), tolerance_m: f64::from(scale), ..CONFIG };
-            let Trust { sigma_m, probability } = calibrate(&surface, |_| true, &config);
+            let Trust { sigma_m, probability } = TrustModel::new(&surface, config).calibrate(&surface, |_| true);
             (sigma_m.map(|sigma_m| sigma_m / scale), probability)
         };
-        let ((fine, p), (coarse, q)) = (calibrated(1.0), calibrated(4.0));
+        let ((fine, p), (coarse, q)) = (scaled(1.0), scaled(4.0));
         let near =
             |a: &Grid<f32>, b: &Grid<f32>| a.data().iter().zip(b.data()).all(|(a, b)| (a / b - 1.0).abs() < 1e-3);
         assert!(near(&fine, &coarse) && near(&p, &q));

@@ -19,7 +19,7 @@ use std::sync::OnceLock;
 use camera::ImagePoint;
 use nalgebra::{Matrix3, Vector3};
 use numeric::upper_median;
-use raster::{Grid, gaussian, level_from_level0, level0_from_level};
+use raster::{gaussian, level_from_level0, level0_from_level};
 use rayon::prelude::*;
 
 use super::off_trajectory::{PIECE_M, off_trajectory};
@@ -206,15 +206,10 @@ impl Found {
 /// one. Here they count as much as the texture of lit or shaded ground.
 fn evened(view: &SweepView) -> SweepView {
     let image = &view.levels[0];
-    let combined = |a: &Grid<f32>, b: &Grid<f32>, of: &dyn Fn(f32, f32) -> f32| {
-        let mut out = a.clone();
-        out.data_mut().iter_mut().zip(b.data()).for_each(|(a, b)| *a = of(*a, *b));
-        out
-    };
     let noise = view.noise * view.noise;
-    let high = combined(image, &gaussian(image, EVEN_PX), &|value, mean| value - mean);
-    let variance = gaussian(&combined(&high, &high, &|a, b| a * b), EVEN_PX);
-    let even = combined(&high, &variance, &|value, variance| value / (variance + noise).sqrt());
+    let high = image.zip_map(&gaussian(image, EVEN_PX), |value, mean| value - mean);
+    let variance = gaussian(&high.map(|value| value * value), EVEN_PX);
+    let even = high.zip_map(&variance, |value, variance| value / (variance + noise).sqrt());
     // No patch is flat now. Those that were hold noise, which the correlation tells.
     SweepView { camera: view.camera.clone(), levels: vec![even], noise: 0.0, contrast: Vec::new(), first: view.first }
 }
