@@ -6,7 +6,9 @@
 //! and the ground beside it stands out as an object does. Planes that turn away from what lies off
 //! the wider ones tell both: they know the slope that goes on under a roof.
 //!
-//! A crest that bends more than planes do stands above them, too, but has no wall.
+//! A crest that bends more than planes do stands above them, too, but has no wall. The rim of a
+//! plateau has one on one side, and goes on level on the other, where a roof meets the slope with a
+//! bend.
 
 use raster::Grid;
 
@@ -24,6 +26,19 @@ const ROUNDS: usize = 4;
 /// Share of the border of a part along which the surface need not drop. The planes have told that
 /// it stands out; a crest has no wall anywhere.
 const WALL_FREE_SHARE: f64 = 0.9;
+/// Largest part of which a wall somewhere along the border is enough, square metres: a house. Voids
+/// and trees hide its other walls. What is larger needs walls all around, or bends: the rim of a
+/// plateau with a cliff on one side is no object.
+const HOUSE_M2: f64 = 1000.0;
+/// Distance to each side of the border over which its bend is measured, metres: a wall of a surface
+/// made from images is a ramp of two to three metres.
+const BEND_REACH_M: f64 = 4.0;
+/// Mean change of slope across the border where there is no wall, from which a part is an object: a
+/// flat roof bends away from the slope that it is flush with. Roofs of four places of another
+/// simulator have 0.3 to 1.2, and crests of scarps of La Réunion at most 0.28.
+const BEND: f32 = 0.3;
+/// Height above the planes below which a border has no wall, metres.
+const LEAST_WALL_M: f32 = 1.0;
 /// Heights around that lie below the planes, as a share of those at them, up to which the planes
 /// know the ground. In a dense quarter they go through roofs of many heights, with the lower roofs
 /// and the streets below.
@@ -99,10 +114,18 @@ impl<'a> OffPlanes<'a> {
         Offset { above: difference(heights, &expected), near_m }
     }
 
-    /// Returns the cells of parts far above the planes that have a wall, or voids that may hide it.
+    /// Returns the cells of parts far above the planes whose border has walls, or voids that may
+    /// hide them.
     fn raised_parts(&self, offset: &Offset) -> Grid<bool> {
         let parts = self.parts(offset);
-        parts.mask(|part| self.is_far(&parts, part, offset) && self.has_wall(&parts, part, offset, self.surface))
+        parts.mask(|part| {
+            let has_walls = |free_share| self.has_walls(&parts, part, offset, (self.surface, free_share));
+            let is_small = parts.cells(part).len() as f64 * self.cell_m.powi(2) <= HOUSE_M2;
+            self.is_far(&parts, part, offset)
+                && (self.is_border_void(&parts, part)
+                    || has_walls(WALL_FREE_SHARE)
+                        && (is_small || has_walls(FREE_SHARE) || self.bends(&parts, part, offset)))
+        })
     }
 
     /// Returns the cells of parts far below the planes where those lie at the ground.
@@ -113,7 +136,8 @@ impl<'a> OffPlanes<'a> {
         parts.mask(|part| {
             self.is_far(&parts, part, &below)
                 && self.is_ground_above(&parts, part, &below)
-                && self.has_wall(&parts, part, &below, &turned)
+                && (self.is_border_void(&parts, part)
+                    || self.has_walls(&parts, part, &below, (&turned, WALL_FREE_SHARE)))
         })
     }
 
@@ -126,15 +150,35 @@ impl<'a> OffPlanes<'a> {
         parts.cells(part).iter().any(|&cell| offset.above.data()[cell as usize] > self.far_m)
     }
 
-    /// Whether the surface drops somewhere along the border of a part by about as much as the part
-    /// stands above the planes there.
-    fn has_wall(&self, parts: &Regions, part: usize, offset: &Offset, surface: &Grid<f32>) -> bool {
-        if void_share(parts, part, surface) > FREE_SHARE {
-            return true;
-        }
+    fn is_border_void(&self, parts: &Regions, part: usize) -> bool {
+        void_share(parts, part, self.surface) > FREE_SHARE
+    }
+
+    /// Whether the surface drops along the border of a part, but for `free_share` of it, by about
+    /// as much as the part stands above the planes there.
+    fn has_walls(
+        &self,
+        parts: &Regions,
+        part: usize,
+        offset: &Offset,
+        (surface, free_share): (&Grid<f32>, f64),
+    ) -> bool {
         let drops = parts.drops_m(part, surface, self.cell_m).into_iter();
         let excess = drops.map(|(cell, drop_m)| drop_m - DROP_SHARE * offset.above.data()[cell as usize]);
-        quantile(&mut excess.collect::<Vec<f32>>(), WALL_FREE_SHARE).is_none_or(|excess_m| excess_m >= 0.0)
+        quantile(&mut excess.collect::<Vec<f32>>(), free_share).is_none_or(|excess_m| excess_m >= 0.0)
+    }
+
+    /// Whether the surface bends upwards at the border of a part where it has no wall.
+    fn bends(&self, parts: &Regions, part: usize, offset: &Offset) -> bool {
+        let reach = ((BEND_REACH_M / self.cell_m).round() as usize).max(1);
+        let (mut bend_m, mut count) = (0.0, 0.0);
+        for (cell, [inside_m, border_m, outside_m]) in parts.across(part, self.surface, reach) {
+            if border_m - outside_m < DROP_SHARE * offset.above.data()[cell as usize].max(LEAST_WALL_M) {
+                bend_m += inside_m - 2.0 * border_m + outside_m;
+                count += 1.0;
+            }
+        }
+        bend_m >= BEND * count * (reach as f64 * self.cell_m) as f32
     }
 
     /// Whether the planes around a part below them lie at the ground: many heights lie there, and
@@ -195,6 +239,23 @@ mod tests {
         let found = OffPlanes::new(&crest, 1.0, 0.05, &GroundConfig::default());
         assert_eq!(share(&found.no_ground(&crest, &crest.map(|_| false)), |_, _| true), 0.0);
         assert_eq!(share(&found.sunken(), |_, _| true), 0.0);
+    }
+
+    #[test]
+    fn the_edge_of_a_plateau_above_a_cliff_is_ground() {
+        // The plateau rises towards its edge, 25 m above the land below, and has some noise.
+        let scarp = surface(|column, row| {
+            let noise = ((column * 7 + row * 13) % 11) as f32 * 0.02;
+            noise
+                + if column < 100 + row % 40 / 4 {
+                    25.0 + 0.002 * (column * column) as f32
+                } else {
+                    0.1 * (200 - column) as f32
+                }
+        });
+        let found =
+            OffPlanes::new(&scarp, 1.0, 0.05, &GroundConfig::default()).no_ground(&scarp, &scarp.map(|_| false));
+        assert!(share(&found, |_, _| true) < 0.01);
     }
 
     #[test]

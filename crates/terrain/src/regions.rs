@@ -121,6 +121,30 @@ impl Regions {
         self.cells(region).iter().flat_map(beside).filter(move |&cell| !self.holds(region, cell))
     }
 
+    /// Returns the heights across the border of a region, along rows and columns: `reach` cells
+    /// inside, at the border, and as far outside; with the cell of the border. All are known, and
+    /// the middle and the first lie in the region.
+    pub(crate) fn across(&self, region: usize, surface: &Grid<f32>, reach: usize) -> Vec<(u32, [f32; 3])> {
+        let (width, reach) = (surface.width(), reach as i64);
+        let at = |x: i64, y: i64| {
+            let (x, y) = (usize::try_from(x).ok()?, usize::try_from(y).ok()?);
+            let height = surface.get(x, y).filter(|height| !height.is_nan())?;
+            Some((self.holds(region, (y * width + x) as u32), *height))
+        };
+        let mut found = Vec::new();
+        for &cell in self.cells(region) {
+            let (x, y) = ((cell as usize % width) as i64, (cell as usize / width) as i64);
+            for (dx, dy) in [(1, 0), (-1, 0), (0, 1), (0, -1)] {
+                let heights = [-reach, 0, 1, reach].map(|k| at(x + k * dx, y + k * dy));
+                if let [Some((true, inside)), Some((true, border)), Some((false, _)), Some((false, outside))] = heights
+                {
+                    found.push((cell, [inside, border, outside]));
+                }
+            }
+        }
+        found
+    }
+
     /// Heights by which the surface drops along the border of a region, metres, each with its cell
     /// of the region. Empty for a region whose whole border lies at voids or at that of the raster.
     pub(crate) fn drops_m(&self, region: usize, surface: &Grid<f32>, cell_m: f64) -> Vec<(u32, f32)> {

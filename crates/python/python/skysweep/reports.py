@@ -4346,6 +4346,14 @@ class SurfaceReport(Report):
     speckle_removed: int
     """Number of cells removed as speckle."""
 
+    expected_right: float
+    """Number of heights, observed and filled, that are expected to be right within
+    `crate::right_within_m`: the sum of their probabilities."""
+
+    right_within_m: float
+    """Error below which a height counts as right, metres: in `expected_right` and in
+    `confidence.tif`."""
+
     kept_by_view: list[float]
     """Share of each view's pixels with which another view agrees."""
 
