@@ -156,9 +156,9 @@ def places(shared, scenes):
 
 def table(results):
     columns = {
-        "right": "right, %", "promised": "promised, %", "mae_m": "MAE, m", "rmse_m": "RMSE, m", "le99_m": "99th percentile, m", "observed": "observed, %",
-        "observed_mae_m": "MAE observed, m", "too_low": "too low, %", "too_high": "too high, %", "filled_mae_m": "MAE filled, m",
-        "within_sigma": "below 1 σ, %", "cpu_s": "CPU, s",
+        "right": "right, %", "promised": "promised, %", "mae_m": "MAE, m", "rmse_m": "RMSE, m", "le99_m": "99th percentile, m",
+        "observed": "observed, %", "observed_mae_m": "MAE observed, m", "too_low": "too low, %", "too_high": "too high, %",
+        "filled_mae_m": "MAE filled, m", "within_sigma": "below 1 σ, %", "cpu_s": "CPU, s",
     }
     rows = [f"| place | {' | '.join(columns.values())} |", "|---" * (len(columns) + 1) + "|"]
     for name, both in results.items():
@@ -171,8 +171,9 @@ HEADER = """# Surfaces of other places, before and after
 
 Made by `benches/evidence/places.py`, preset `balanced`, on one machine; each entry is before → now, each surface aligned on its own. *Right*:
 within a metre (WHU-TLC: 2.5 m, of a reference that holds the other blocks too, so that only the change tells) of all cells of the reference,
-filled ones included, by the nearest cell. *Promised*: the share that `confidence.tif` expects to be right (WHU-TLC: within two cells). *Too low* and *too high*: observed cells more than 2 m off. *Blind*: the seed was stated before
-its result was looked at; constants were chosen with the other places in view.
+filled ones included, by the nearest cell. *Promised*: the share that `confidence.tif` expects to be right (WHU-TLC: within two cells).
+*Too low* and *too high*: observed cells more than 2 m off. *Blind*: the seed was stated before its result was looked at; constants were
+chosen with the other places in view.
 
 """
 

@@ -25,7 +25,7 @@ from rasterio.io import MemoryFile
 warnings.filterwarnings("ignore", category=rasterio.errors.NotGeoreferencedWarning)
 METRES_PER_DEGREE = 111_000.0
 # Warnings about other things than images and pointing, which good scenes may have.
-OTHER_WARNINGS = ("% of the ", "nearly the same line")
+OTHER_WARNINGS = ("cells have an observed height", "of the heights, filled ones included", "nearly the same line")
 
 
 def read(path):

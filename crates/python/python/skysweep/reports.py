@@ -4347,8 +4347,8 @@ class SurfaceReport(Report):
     """Number of cells removed as speckle."""
 
     expected_right: float
-    """Number of heights, observed and filled, that are expected to be right within
-    `crate::right_within_m`: the sum of their probabilities."""
+    """Number of heights, observed and filled, that are expected to be right within 1 m, or
+    within two cells where those are larger: the sum of their probabilities."""
 
     right_within_m: float
     """Error below which a height counts as right, metres: in `expected_right` and in

@@ -92,8 +92,8 @@ pub struct CellCounts {
     pub streets: usize,
     /// Number of cells removed as speckle.
     pub speckle_removed: usize,
-    /// Number of heights, observed and filled, that are expected to be right within
-    /// [`crate::right_within_m`]: the sum of their probabilities.
+    /// Number of heights, observed and filled, that are expected to be right within 1 m, or within
+    /// two cells where those are larger: the sum of their probabilities.
     pub expected_right: f64,
 }
 
@@ -136,8 +136,8 @@ impl CellCounts {
         }
     }
 
-    /// Returns the share of the heights, observed and filled, that are expected to be right within
-    /// [`crate::right_within_m`], 0 to 1; `None` without any height.
+    /// Returns the share of the heights, observed and filled, that are expected to be right, 0 to
+    /// 1; `None` without any height.
     pub fn expected_share(&self) -> Option<f64> {
         let heights = self.observed + self.filled;
         (heights > 0).then(|| self.expected_right / heights as f64)
@@ -262,10 +262,7 @@ fn fuse(
     drop(placed);
     if let Some(mask) = mask {
         // They are not trusted, and must not fill what is beside them.
-        let is_masked = |i: usize| mask.masked.data()[i];
-        fused.height_m.void_where(is_masked);
-        let confidence = fused.confidence.data_mut().iter_mut().enumerate();
-        confidence.filter(|(i, _)| is_masked(*i)).for_each(|(_, confidence)| *confidence = 0.0);
+        fused.height_m.void_where(|i| mask.masked.data()[i]);
     }
     let sights = grid_sights(pixels, grid, &fused.height_m, origin_m)?;
     let lengths = Lengths { gsd_m: grid.gsd_m, step_m, camera_m: input.camera_m };

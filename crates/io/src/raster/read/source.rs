@@ -200,8 +200,7 @@ impl ImageSource {
         };
         let mut samples = self.read_band(band, inside)?;
         if let Some(mask) = self.read_mask(band, inside)? {
-            let void = samples.data_mut().iter_mut().zip(mask.data()).filter(|(_, mask)| **mask == 0);
-            void.for_each(|(sample, _)| *sample = f32::NAN);
+            samples.void_where(|i| mask.data()[i] == 0);
         }
         let (x, y) = (window.x - inside.x, window.y - inside.y);
         Ok(samples.window(Window { x, y, ..window }, f32::NAN))
