@@ -110,7 +110,8 @@ pub struct Change {
     pub numbers: Grid<u32>,
     /// The regions, by their numbers.
     pub regions: Vec<ChangeRegion>,
-    /// Factor by which the given deviations were multiplied.
+    /// Factor by which the given deviations were multiplied, at least 1; where none are given, the
+    /// deviation that was measured, metres.
     pub sigma_factor: f64,
     /// Correlation of the errors of two cells.
     pub correlation: ErrorCorrelation,
@@ -317,7 +318,10 @@ fn calibrated(input: &ChangeInput<'_>, config: &ChangeConfig) -> Result<Change, 
         return Err(Reason::TooFewCells { found: deciding_cells, observed: observed_cells, needed: CELLS_MIN });
     }
     // Identical surfaces have no spread; the least deviation keeps them apart from a division by 0.
-    let factor = spread(&significance).max(1e-3);
+    // The spread is that of the many good cells. It does not show that stated deviations are too
+    // large where cells are weak, so it makes none smaller.
+    let least = if input.sigma.is_some() { 1.0 } else { 1e-3 };
+    let factor = spread(&significance).max(least);
     sigma.data_mut().iter_mut().for_each(|s| *s = (*s * factor as f32).max(SIGMA_MIN_M));
     for (z, (d, s)) in significance.data_mut().iter_mut().zip(difference.data().iter().zip(sigma.data())) {
         *z = if z.is_finite() { d / s } else { f32::NAN };

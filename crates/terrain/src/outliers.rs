@@ -26,17 +26,16 @@ const ROUNDS: usize = 4;
 /// Share of the border of a part along which the surface need not drop. The planes have told that
 /// it stands out; a crest has no wall anywhere.
 const WALL_FREE_SHARE: f64 = 0.9;
-/// Largest part of which a wall somewhere along the border is enough, square metres: a house. Voids
-/// and trees hide its other walls. What is larger needs walls all around, or bends: the rim of a
-/// plateau with a cliff on one side is no object.
-const HOUSE_M2: f64 = 1000.0;
+/// Longest border of which a wall somewhere is enough, metres: that of a block of houses 60 m wide,
+/// half as long again in cells. Voids and trees hide the other walls. A longer one needs walls all
+/// along, or bends: the rim of a plateau with a cliff on one side is no object.
+const BLOCK_BORDER_M: f64 = 360.0;
 /// Distance to each side of the border over which its bend is measured, metres: a wall of a surface
 /// made from images is a ramp of two to three metres.
 const BEND_REACH_M: f64 = 4.0;
 /// Mean change of slope across the border where there is no wall, from which a part is an object: a
 /// flat roof bends away from the slope that it is flush with. The rims of La Réunion have less, and
-/// roofs of `random:` 9801, 9804 and 9878 twice as much. Of `random:` 8407 some blocks have less,
-/// too, and are lost where they are larger than a house.
+/// roofs of `random:` 9801, 9804 and 9878 twice as much.
 const BEND: f32 = 0.3;
 /// Height above the planes that the border of a part counts as having at least, where a wall is
 /// told from a bend, metres: smaller drops are noise.
@@ -127,10 +126,10 @@ impl<'a> OffPlanes<'a> {
             if self.is_border_void(&parts, part) {
                 return true;
             }
-            let is_small = parts.cells(part).len() as f64 * self.cell_m.powi(2) <= HOUSE_M2;
             let mut excess_m = self.excess_m(&parts, part, offset, self.surface);
+            let is_short = excess_m.len() as f64 * self.cell_m <= BLOCK_BORDER_M;
             has_walls(&mut excess_m, WALL_FREE_SHARE)
-                && (is_small || has_walls(&mut excess_m, FREE_SHARE) || self.bends(&parts, part, offset))
+                && (is_short || has_walls(&mut excess_m, FREE_SHARE) || self.bends(&parts, part, offset))
         })
     }
 
@@ -160,8 +159,9 @@ impl<'a> OffPlanes<'a> {
         void_share(parts, part, self.surface) > FREE_SHARE
     }
 
-    /// How much more a surface drops along the border of a part than a wall has to, metres: a wall
-    /// drops by about as much as the part stands above the planes there.
+    /// How much more a surface drops along the border of a part than a wall has to, metres, at each
+    /// side of a cell with known heights beyond: a wall drops by about as much as the part stands
+    /// above the planes there.
     fn excess_m(&self, parts: &Regions, part: usize, offset: &Offset, surface: &Grid<f32>) -> Vec<f32> {
         let drops = parts.drops_m(part, surface, self.cell_m).into_iter();
         drops.map(|(cell, drop_m)| drop_m - DROP_SHARE * offset.above.data()[cell as usize]).collect()
