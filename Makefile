@@ -8,7 +8,7 @@ SHELL := /bin/bash
 .DEFAULT_GOAL := help
 
 # Builds GDAL and PROJ from source into what is built (see docs/decisions/static-build.md).
-STATIC := RUSTFLAGS='--cfg skysweep_static' CMAKE_TOOLCHAIN_FILE=$(CURDIR)/crates/io/static.cmake CARGO_TARGET_DIR=target/static
+STATIC := RUSTFLAGS='--cfg skysweep_static' CMAKE_TOOLCHAIN_FILE=$(CURDIR)/crates/formats/static.cmake CARGO_TARGET_DIR=target/static
 PACKAGES := libgdal-dev pkg-config libsqlite3-dev g++
 SKYSWEEP := target/release/skysweep
 TOWN := data-samples/town

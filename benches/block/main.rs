@@ -150,7 +150,7 @@ struct Errors {
 impl Errors {
     fn of(run: &Path, side: usize, report: &Value) -> anyhow::Result<Self> {
         let dsm = run.join("dsm/dsm.tif");
-        let info = io::raster::ImageSource::open(&dsm)?.info().clone();
+        let info = formats::raster::ImageSource::open(&dsm)?.info().clone();
         let chunk = report["chunks"]["side"].as_u64().map_or(usize::MAX, |side| side as usize);
         // A side is cut into equal parts that are no longer than a chunk.
         let borders = |length: usize| -> Vec<usize> {

@@ -4,7 +4,7 @@ use numeric::vector::{cross, dot, sub};
 use std::path::Path;
 
 use anyhow::{Context, bail};
-use io::npy::{self, NpyData};
+use formats::npy::{self, NpyData};
 use priors::{MapConfig, PriorMaps, PriorModel, Rays, View, Visibility};
 use rayon::prelude::*;
 use serde_json::{Value, json};

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use camera::{Lens, Pose};
 use city::{ModelPoint, SurfaceClass};
-use io::colmap::{self, ColmapModel};
-use io::npy::{self, NpyData};
+use formats::colmap::{self, ColmapModel};
+use formats::npy::{self, NpyData};
 use priors::{PriorModel, Sample, View};
 use serde_json::Value;
 

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::ensure;
-use io::raster::{Band, BandData, write_image_with_rpc};
+use formats::raster::{Band, BandData, write_image_with_rpc};
 
 use super::town::{self, Frame, Look};
 
@@ -44,7 +44,7 @@ pub(crate) fn image(folder: &Path, name: &str, tile: &Path, look: &Look, frame: 
     }
     std::fs::write(&path, xml + "</VRTRasterBand>\n</VRTDataset>\n")?;
     let sidecar = folder.join(format!("{name}_RPC.TXT"));
-    io::rpc::write(&sidecar, &town::rpc(look, frame), io::rpc::RpcFormat::Text, true)?;
+    formats::rpc::write(&sidecar, &town::rpc(look, frame), formats::rpc::RpcFormat::Text, true)?;
     Ok(path)
 }
 

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use anyhow::Context;
-use io::raster::{ImageSource, read_dem_window};
+use formats::raster::{ImageSource, read_dem_window};
 use raster::Window;
 
 use super::town;

@@ -24,7 +24,7 @@ use std::process::Command;
 
 use anyhow::{Context, ensure};
 use crs::{Crs, MapProjection};
-use io::raster::{Band, BandData, CogRaster, read_dem, write_cog};
+use formats::raster::{Band, BandData, CogRaster, read_dem, write_cog};
 use raster::{GeoTransform, Grid};
 use serde_json::{Value, json};
 

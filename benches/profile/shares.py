@@ -22,7 +22,7 @@ STAGES = [
     ("read-out, support, ranges", r"readout|support\.rs|ranges\.rs|level\.rs|window_sums"),
     ("sources laid over, views, pyramids", r"resample|pyramid|view\.rs|laid\.rs"),
     ("costs", r"sweep/src/cost/|census|shift\.rs|transpose|raise|volume\.rs|prior\.rs"),
-    ("files", r"crates/io|output\.rs|report"),
+    ("files", r"crates/formats|output\.rs|report"),
 ]
 LIBRARIES = [
     ("files", r"deflate|tiff|gdal|libz|png|zstd"),

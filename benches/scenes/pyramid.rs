@@ -18,7 +18,7 @@ type Plane = Vector3<f64>;
 
 /// Measures the slopes of three faces and the height of the pyramid in a DSM.
 pub(crate) fn measure(dsm: &Path) -> anyhow::Result<Vec<(String, f64)>> {
-    let dem = io::raster::read_dem(dsm)?;
+    let dem = formats::raster::read_dem(dsm)?;
     let epsg = dem.horizontal_epsg.unwrap_or(32636);
     let apex = crs::MapProjection::from_epsg(epsg)?.map_from_lonlat(APEX.0, APEX.1)?;
     let mut points = Vec::new();

@@ -147,7 +147,7 @@ impl Scene {
 pub(crate) fn megapixels(images: &[PathBuf]) -> anyhow::Result<f64> {
     let mut pixels = 0;
     for image in images {
-        let source = io::raster::ImageSource::open(image)?;
+        let source = formats::raster::ImageSource::open(image)?;
         pixels += source.info().width * source.info().height;
     }
     Ok(pixels as f64 / 1e6)

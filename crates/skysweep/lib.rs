@@ -42,17 +42,17 @@
 //! - Methods: [`sweep`] (the height sweep), [`reconstruct`] (from views in memory to a surface),
 //!   [`eval`], [`priors`], [`heightmap`], [`groundview`], [`ortho`], [`splats`], [`terrain`],
 //!   [`train`], [`tsdf`], [`change`], [`classes`], [`buildings`], [`simulate`].
-//! - Files: [`io`] reads and writes rasters, cameras, points and splats, [`cityfiles`] city models
-//!   and meshes, and [`report`] makes pictures and pages.
+//! - Files: [`formats`] reads and writes rasters, cameras, points and splats, [`cityfiles`] city
+//!   models and meshes, and [`report`] makes pictures and pages.
 //! - [`numeric`] has progress and cancellation, seeded random numbers and order statistics.
 //!
 //! # Example
 //! A camera's ground sampling distance, from the RPC that an image carries:
 //! ```
-//! use skysweep::{camera::RpcCamera, geodesy::LonLatHeight, io};
+//! use skysweep::{camera::RpcCamera, formats, geodesy::LonLatHeight};
 //!
 //! let image = concat!(env!("CARGO_MANIFEST_DIR"), "/data-samples/town/view_1.tif");
-//! let camera = RpcCamera::new(io::rpc::read(image.as_ref())?.rpc);
+//! let camera = RpcCamera::new(formats::rpc::read(image.as_ref())?.rpc);
 //! let centre = camera.rpc.domain().centre;
 //! let pixel = camera.project(LonLatHeight { height_m: 100.0, ..centre })?;
 //! assert!((camera.gsd_at(pixel, 100.0)?.mean_m() - 0.5).abs() < 0.1);
@@ -71,11 +71,11 @@ pub use classes;
 pub use colmap;
 pub use crs;
 pub use eval;
+pub use formats;
 pub use gaussian;
 pub use geodesy;
 pub use groundview;
 pub use heightmap;
-pub use io;
 pub use jobs;
 pub use numeric;
 pub use occlusion;

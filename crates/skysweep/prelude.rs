@@ -18,9 +18,9 @@
 
 pub use camera::{ImagePoint, Rpc, RpcCamera};
 pub use crs::VerticalDatum;
+pub use formats::raster::{Dem, read_dem};
+pub use formats::rpc::read as read_rpc;
 pub use geodesy::LonLatHeight;
-pub use io::raster::{Dem, read_dem};
-pub use io::rpc::read as read_rpc;
 pub use numeric::{CancelFlag, Cancellable, Progress, Silent};
 pub use raster::{GeoTransform, Grid};
 

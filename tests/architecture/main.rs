@@ -43,7 +43,7 @@ const FLOORS: [(&str, u8); 37] = [
     ("skysweep-colmap", 4),
     ("skysweep-tsdf", 4),
     ("skysweep-train", 5),
-    ("skysweep-io", 5),
+    ("skysweep-formats", 5),
     ("skysweep-cityfiles", 6),
     ("skysweep-reconstruct", 6),
     ("skysweep-report", 6),
@@ -58,11 +58,15 @@ const FLOORS: [(&str, u8); 37] = [
 ];
 
 /// Foreign packages that only one crate may use: (package, its home).
-const HOMES: [(&str, &str); 4] =
-    [("gdal", "skysweep-io"), ("gdal-sys", "skysweep-io"), ("proj", "skysweep-crs"), ("proj-sys", "skysweep-crs")];
+const HOMES: [(&str, &str); 4] = [
+    ("gdal", "skysweep-formats"),
+    ("gdal-sys", "skysweep-formats"),
+    ("proj", "skysweep-crs"),
+    ("proj-sys", "skysweep-crs"),
+];
 
 /// Folders under `crates/` whose sources may touch the file system.
-const FILE_CRATES: [&str; 9] = ["io", "cityfiles", "job", "surfaces", "dsm", "scenes", "viewer", "jobs", "cli"];
+const FILE_CRATES: [&str; 9] = ["formats", "cityfiles", "job", "surfaces", "dsm", "scenes", "viewer", "jobs", "cli"];
 
 /// Most sources of a folder, so that its list is read at one look.
 const FOLDER_FILES: usize = 25;
@@ -432,8 +436,8 @@ fn the_scan_sees_every_spelling() {
 #[test]
 fn arrows_up_and_sideways_are_found() {
     let floors = floors();
-    assert!(broken_arrow(&floors, "skysweep-camera", "skysweep-io").is_some());
+    assert!(broken_arrow(&floors, "skysweep-camera", "skysweep-formats").is_some());
     assert!(broken_arrow(&floors, "skysweep-sweep", "skysweep-eval").is_some());
-    assert!(broken_arrow(&floors, "skysweep-io", "skysweep-camera").is_none());
+    assert!(broken_arrow(&floors, "skysweep-formats", "skysweep-camera").is_none());
     assert!(broken_arrow(&floors, "skysweep-camera", "serde").is_none());
 }

@@ -10,7 +10,7 @@ use std::sync::OnceLock;
 
 use assert_cmd::Command;
 use crs::Crs;
-use io::raster::{Band, BandData, CogRaster, Dem, ImageSource, write_cog};
+use formats::raster::{Band, BandData, CogRaster, Dem, ImageSource, write_cog};
 use raster::Grid;
 use serde_json::Value;
 

@@ -35,7 +35,7 @@ static BOTH: LazyLock<Both> = LazyLock::new(|| {
 
 impl Both {
     fn dsm(&self, name: &str) -> Grid<f32> {
-        io::raster::read_dem(self.folder.path().join(name).join("dsm/dsm.tif")).unwrap().heights
+        formats::raster::read_dem(self.folder.path().join(name).join("dsm/dsm.tif")).unwrap().heights
     }
 
     fn completeness(&self, name: &str) -> f64 {
@@ -132,7 +132,7 @@ fn fast_chunks_have_the_heights_of_one_piece() {
     let heights = |name: &str, options: &[&str]| {
         let out = folder.path().join(name);
         run(&out, &[&["--preset", "fast"], options].concat());
-        io::raster::read_dem(out.join("dsm/dsm.tif")).unwrap().heights
+        formats::raster::read_dem(out.join("dsm/dsm.tif")).unwrap().heights
     };
     let apart = share_apart(&heights("once", &[]), &heights("chunks", &["--chunk", "200"]));
     assert!(apart < 0.005, "{:.2} % of the cells are more than a metre apart", 100.0 * apart);
@@ -141,7 +141,7 @@ fn fast_chunks_have_the_heights_of_one_piece() {
 /// Pointing, noise and heights come from the whole scene, whatever the bounds.
 #[test]
 fn overlapping_bounds_agree_where_they_overlap() {
-    let whole = io::raster::read_dem(BOTH.folder.path().join("once/dsm/dsm.tif")).unwrap();
+    let whole = formats::raster::read_dem(BOTH.folder.path().join("once/dsm/dsm.tif")).unwrap();
     let (columns, rows) = (whole.heights.width(), whole.heights.height());
     let folder = tempfile::tempdir().unwrap();
     let part = |name: &str, from: usize, to: usize| {
@@ -152,7 +152,7 @@ fn overlapping_bounds_agree_where_they_overlap() {
         let mut options = vec!["--bounds"];
         options.extend(bounds.iter().map(String::as_str));
         assert!(run(&out, &options)["chunks"].is_null());
-        io::raster::read_dem(out.join("dsm/dsm.tif")).unwrap().heights
+        formats::raster::read_dem(out.join("dsm/dsm.tif")).unwrap().heights
     };
     let (first, last) = (columns / 3, columns * 2 / 3);
     let (west, east) = (part("west", 0, last), part("east", first, columns));

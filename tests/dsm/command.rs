@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
-use io::raster::{Band, BandData, ImageSource, write_image_with_rpc};
+use formats::raster::{Band, BandData, ImageSource, write_image_with_rpc};
 use predicates::prelude::*;
 use raster::Grid;
 use serde_json::Value;
@@ -128,7 +128,7 @@ fn options_are_obeyed() {
     let folder = tempfile::tempdir().unwrap();
     let first = folder.path().join("first");
     small(&first).assert().code(0);
-    let dem = io::raster::read_dem(first.join("dsm/dsm.tif")).unwrap();
+    let dem = formats::raster::read_dem(first.join("dsm/dsm.tif")).unwrap();
     let (x, y) = dem.geotransform.map_from_cell(50.5, 60.5);
     let bounds = [x, y - 90.0, x + 120.0, y].map(|v| v.to_string());
     let out = folder.path().join("part");
@@ -139,7 +139,7 @@ fn options_are_obeyed() {
         .assert()
         .code(0)
         .stderr(predicate::str::contains("\"event\":\"stage\""));
-    let part = io::raster::read_dem(out.join("dsm/dsm.tif")).unwrap();
+    let part = formats::raster::read_dem(out.join("dsm/dsm.tif")).unwrap();
     assert_eq!((part.heights.width(), part.heights.height()), (120, 90));
     assert_eq!(part.vertical, Some(crs::VerticalDatum::Egm96));
     // The same ground above another datum: they differ by the undulation, the same one everywhere.
@@ -201,7 +201,7 @@ fn images_without_rpc_and_damaged_ones_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
     let plain = folder.path().join("plain.png");
-    io::raster::write_png_gray(&plain, &raster::Grid::filled(64, 64, 7), false).unwrap();
+    formats::raster::write_png_gray(&plain, &raster::Grid::filled(64, 64, 7), false).unwrap();
     refused_beside_a_view(&plain, &out, "RPC");
     let damaged = folder.path().join("damaged.tif");
     let bytes = std::fs::read(sample("view_2.tif")).unwrap();
@@ -214,11 +214,11 @@ fn images_without_rpc_and_damaged_ones_are_refused() {
 fn images_of_different_places_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let (far, out) = (folder.path().join("far.tif"), folder.path().join("out"));
-    let mut rpc = io::rpc::read_for_image(&sample("view_3.tif")).unwrap().rpc;
+    let mut rpc = formats::rpc::read_for_image(&sample("view_3.tif")).unwrap().rpc;
     rpc.long_off += 0.5;
     let pixels = raster::Grid::filled(722, 752, 100u16);
-    let bands = [io::raster::Band { description: "pan", data: io::raster::BandData::U16(&pixels) }];
-    io::raster::write_image_with_rpc(&far, &bands, &rpc, None, false).unwrap();
+    let bands = [formats::raster::Band { description: "pan", data: formats::raster::BandData::U16(&pixels) }];
+    formats::raster::write_image_with_rpc(&far, &bands, &rpc, None, false).unwrap();
     refused_beside_a_view(&far, &out, "share no ground");
 }
 
@@ -227,12 +227,12 @@ fn images_of_different_places_are_refused() {
 fn images_without_tie_points_are_refused_unless_the_pointing_is_taken_as_it_is() {
     let folder = tempfile::tempdir().unwrap();
     let (other, out) = (folder.path().join("other.tif"), folder.path().join("out"));
-    let rpc = io::rpc::read_for_image(&sample("view_3.tif")).unwrap().rpc;
+    let rpc = formats::rpc::read_for_image(&sample("view_3.tif")).unwrap().rpc;
     let mut random = numeric::SplitMix64::new(7);
     let values = (0..722 * 752).map(|_| random.uniform_in(200.0, 1800.0) as u16).collect();
     let pixels = raster::Grid::from_vec(722, 752, values).unwrap();
-    let bands = [io::raster::Band { description: "pan", data: io::raster::BandData::U16(&pixels) }];
-    io::raster::write_image_with_rpc(&other, &bands, &rpc, None, false).unwrap();
+    let bands = [formats::raster::Band { description: "pan", data: formats::raster::BandData::U16(&pixels) }];
+    formats::raster::write_image_with_rpc(&other, &bands, &rpc, None, false).unwrap();
     for command in ["dsm", "plan"] {
         let mut command_line = skysweep();
         command_line.arg(command).arg(sample("view_1.tif")).arg(&other).arg("-o").arg(&out);
@@ -328,16 +328,16 @@ fn doubtful_images_are_warned_of() {
         told.lines().filter(is_doubt).map(str::to_owned).collect()
     };
     let beside = |image: &Path, shift_px: f64| {
-        let mut rpc = io::rpc::read_for_image(image).unwrap().rpc;
+        let mut rpc = formats::rpc::read_for_image(image).unwrap().rpc;
         rpc.samp_off += shift_px;
         let path = image.with_file_name(format!("{}_RPC.TXT", image.file_stem().unwrap().to_string_lossy()));
-        io::rpc::write(&path, &rpc, io::rpc::RpcFormat::Text, false).unwrap();
+        formats::rpc::write(&path, &rpc, formats::rpc::RpcFormat::Text, false).unwrap();
     };
     // Pixels that are made of those of an image, under its RPC.
     let redrawn = |image: &Path, step: usize, void_to: usize| {
         let source = ImageSource::open(image).unwrap();
         let (pixels, rpc) =
-            (source.read_samples(1, source.window()).unwrap(), io::rpc::read_for_image(image).unwrap().rpc);
+            (source.read_samples(1, source.window()).unwrap(), formats::rpc::read_for_image(image).unwrap().rpc);
         let (width, height) = (pixels.width() / step, pixels.height() / step);
         let value =
             |i: usize| if i % width < void_to { 65_535 } else { pixels[(i % width * step, i / width * step)] as u16 };
@@ -398,7 +398,7 @@ fn only_heights_have_a_vertical_datum() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
     small(&out).args(["--vertical", "egm96"]).assert().code(0);
-    let datum = |name: &str| io::raster::read_dem(out.join("dsm").join(name)).unwrap().vertical;
+    let datum = |name: &str| formats::raster::read_dem(out.join("dsm").join(name)).unwrap().vertical;
     assert_eq!(datum("dsm.tif"), Some(crs::VerticalDatum::Egm96));
     for name in ["sigma.tif", "views.tif", "confidence.tif", "filled.tif"] {
         assert_eq!(datum(name), None, "{name}");
@@ -586,7 +586,7 @@ fn given_values_are_printed_exactly() {
     let area = ["693800.3", "4822300.75", "693920.3", "4822420.75"];
     let ours = run("ours", &[&heights[..], &["--gsd", "1.25", "--crs", "EPSG:32631", "--bounds"], &area].concat());
     assert!(ours.contains(" m (given 163.125 to 268.0625 m, tie points"), "{ours}");
-    let bounds = io::raster::read_dem(folder.path().join("ours/dsm/dsm.tif")).unwrap();
+    let bounds = formats::raster::read_dem(folder.path().join("ours/dsm/dsm.tif")).unwrap();
     let corner = bounds.geotransform.map_from_cell(-0.5, bounds.heights.height() as f64 - 0.5);
     let printed = ours.lines().find_map(|line| line.strip_prefix("bounds        [")).unwrap();
     let printed: Vec<f64> =

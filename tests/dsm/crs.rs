@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use crate::common::{json, simulated, skysweep};
-use io::raster::{ImageSource, read_dem};
+use formats::raster::{ImageSource, read_dem};
 
 /// A smaller town in Florida, where maps are in US survey feet, with fewer samples per pixel.
 const IN_FLORIDA: [(&str, &str); 4] = [

@@ -133,7 +133,7 @@ fn model_with_wrong_heights(path: &Path, every: usize) -> usize {
 
 /// Heights within the square around the open place.
 fn heights_in_the_open_place(dsm: &Path) -> Vec<f64> {
-    let dem = io::raster::read_dem(dsm).unwrap();
+    let dem = formats::raster::read_dem(dsm).unwrap();
     let steps = || (0..40).map(|i| -HALF_M + 0.5 * f64::from(i));
     let places = steps().flat_map(|dy| steps().map(move |dx| (OPEN_PLACE[0] + dx, OPEN_PLACE[1] + dy)));
     let cell = |(x, y)| dem.geotransform.cell_from_map(x, y).map(|(c, r)| (c.round() as usize, r.round() as usize));

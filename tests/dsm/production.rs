@@ -359,7 +359,7 @@ fn changed_inputs_and_settings_are_refused_or_computed_again() {
     let report: Value = serde_json::from_str(&run("run", &["run", "--resume", "--json"], folder.path(), 0).0).unwrap();
     assert_eq!(report["done_before"], 0, "chunks of the old plan are not mixed in: {report}");
     run("merge", &["run", "-q"], folder.path(), 0);
-    let dsm = io::raster::read_dem(folder.path().join("run/dsm/dsm.tif")).unwrap();
+    let dsm = formats::raster::read_dem(folder.path().join("run/dsm/dsm.tif")).unwrap();
     assert_eq!(dsm.geotransform.0[1], 2.5);
     // An edited plan is no plan.
     let plan = folder.path().join("run/plan.json");
@@ -381,7 +381,7 @@ fn an_array_job_is_resumed_after_a_change() {
     let ended = workers.each_mut().map(|worker| worker.wait().unwrap().code());
     assert_eq!(ended, [Some(0); 3]);
     run("merge", &["run", "-q"], folder.path(), 0);
-    let dsm = io::raster::read_dem(folder.path().join("run/dsm/dsm.tif")).unwrap();
+    let dsm = formats::raster::read_dem(folder.path().join("run/dsm/dsm.tif")).unwrap();
     assert_eq!(dsm.geotransform.0[1], 2.5);
     assert!(temporary(folder.path()).is_empty(), "{:?}", temporary(folder.path()));
 }
@@ -518,7 +518,7 @@ fn a_used_configuration_fed_back_gives_the_same_bytes() {
     assert!(products(&folder.path().join("second")) == products(&folder.path().join("first")));
     // Options replace settings of the file.
     run("dsm", &["../first/used_config.toml", "-o", "third", "--gsd", "4", "-q"], &elsewhere, 0);
-    let dsm = io::raster::read_dem(elsewhere.join("third/dsm/dsm.tif")).unwrap();
+    let dsm = formats::raster::read_dem(elsewhere.join("third/dsm/dsm.tif")).unwrap();
     assert_eq!((dsm.geotransform.0[1], dsm.heights.width()), (4.0, 50));
 }
 

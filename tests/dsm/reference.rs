@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use crate::common::{sample, small_town};
 use crs::{Crs, HeightConverter, MapProjection, VerticalDatum};
 use eval::{AlignmentMethod, CellMap, EvalConfig, EvalInput, MetresFromCells, evaluate};
-use io::raster::{Band, BandData, CogRaster, Dem, read_dem, write_cog};
+use formats::raster::{Band, BandData, CogRaster, Dem, read_dem, write_cog};
 use jobs::dsm::{DsmConfig, DsmError, DsmReport, Preset, run};
 use numeric::Silent;
 use raster::{GeoTransform, Grid};

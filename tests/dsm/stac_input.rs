@@ -87,12 +87,12 @@ fn the_rpc_of_an_item_is_taken_where_the_image_has_none() {
         "<VRTDataset rasterXSize=\"32\" rasterYSize=\"32\"><VRTRasterBand dataType=\"Byte\" band=\"1\"/></VRTDataset>";
     fs::write(root.join("plain.vrt"), vrt).unwrap();
     let with_rpc = item(root, 1, &json!({}), assets.clone());
-    assert_eq!(io::rpc::read_for_image(&with_rpc).unwrap().rpc, io::rpc::read(&rpc).unwrap().rpc);
-    assert!(io::rpc::side_files(&with_rpc).contains(&root.join("meta/camera_RPC.TXT")));
+    assert_eq!(formats::rpc::read_for_image(&with_rpc).unwrap().rpc, formats::rpc::read(&rpc).unwrap().rpc);
+    assert!(formats::rpc::side_files(&with_rpc).contains(&root.join("meta/camera_RPC.TXT")));
     // An item is no RPC file, not even its own.
     assets["rpc"]["href"] = json!("view_1.json");
     item(root, 1, &json!({}), assets);
-    assert!(io::rpc::read_for_image(&with_rpc).is_err());
+    assert!(formats::rpc::read_for_image(&with_rpc).is_err());
 }
 
 #[test]

@@ -177,7 +177,7 @@ fn make(folder: &Path) {
         let arguments: Vec<&str> = line.split(' ').collect();
         skysweep().current_dir(folder).args(arguments).arg("-q").assert().success();
     }
-    let rpc = io::rpc::read(&folder.join("a.json")).unwrap().rpc;
+    let rpc = formats::rpc::read(&folder.join("a.json")).unwrap().rpc;
     fs::write(folder.join("a.geom"), geom(&rpc)).unwrap();
     fs::write(folder.join("a.hdr"), envi(&rpc)).unwrap();
     fs::write(folder.join("v.vrt"), vrt(&rpc)).unwrap();
@@ -187,10 +187,10 @@ fn make(folder: &Path) {
         cloud(&folder.join(name));
     }
     let model = folder.join("flight/cameras/sparse/0");
-    let (model, points) = io::colmap::read_with_points(&model).unwrap();
+    let (model, points) = formats::colmap::read_with_points(&model).unwrap();
     let binary = folder.join("aligned/sparse/0");
     fs::create_dir_all(&binary).unwrap();
-    io::colmap::write(&binary, &model, &points, io::colmap::ColmapEncoding::Binary, true).unwrap();
+    formats::colmap::write(&binary, &model, &points, formats::colmap::ColmapEncoding::Binary, true).unwrap();
     let images = [1, 3].map(|i| folder.join(format!("town/view_{i}.tif")));
     let opened = jobs::dsm::open(&jobs::dsm::DsmConfig::new(images.into(), folder.join("none"))).unwrap();
     fs::write(folder.join("opened.json"), serde_json::to_string(&opened).unwrap()).unwrap();
@@ -238,7 +238,7 @@ fn envi(rpc: &camera::Rpc) -> String {
 
 /// A virtual raster over the first view with the RPC in its metadata.
 fn vrt(rpc: &camera::Rpc) -> String {
-    let text = io::rpc::to_text(rpc, io::rpc::RpcFormat::Text).unwrap();
+    let text = formats::rpc::to_text(rpc, formats::rpc::RpcFormat::Text).unwrap();
     let mut items: std::collections::BTreeMap<String, String> = std::collections::BTreeMap::new();
     for (key, value) in text.lines().filter_map(|line| line.split_once(':')) {
         let value = value.split_whitespace().next().unwrap_or_default();

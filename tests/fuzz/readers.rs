@@ -6,10 +6,10 @@ use std::path::Path;
 use camera::{ImagePoint, Rpc, RpcCamera};
 use city::{MeshConfig, TriangleMesh, check_solids};
 use cityfiles::{CityJsonOptions, MeshFormat};
+use formats::points::{CellLattice, PointCloud};
+use formats::raster::ImageSource;
+use formats::rpc::RpcFormat;
 use geodesy::{LonLatHeight, MapPoint};
-use io::points::{CellLattice, PointCloud};
-use io::raster::ImageSource;
-use io::rpc::RpcFormat;
 use raster::Window;
 
 /// Pixels that are read of an image, on a side.
@@ -74,9 +74,9 @@ fn whether<T, E: Into<Box<dyn Error>>>(found: Result<T, E>) -> Outcome {
 pub(crate) fn call(reader: Reader, path: &Path) -> Outcome {
     let folder = path.parent().expect("a file in a folder");
     match reader {
-        Reader::Rpc => use_rpc(&io::rpc::read(path)?.rpc),
+        Reader::Rpc => use_rpc(&formats::rpc::read(path)?.rpc),
         Reader::Image => image(path),
-        Reader::Dem => whether(io::raster::read_dem(path)),
+        Reader::Dem => whether(formats::raster::read_dem(path)),
         Reader::City => city_model(path, folder),
         Reader::Surface => whether(cityfiles::surfaces::read(path, &MeshConfig::default())),
         Reader::Cloud => {
@@ -87,26 +87,26 @@ pub(crate) fn call(reader: Reader, path: &Path) -> Outcome {
             whether(grid)
         }
         Reader::Colmap => {
-            let (model, points) = io::colmap::read_with_points(folder)?;
-            let encoding = io::colmap::ColmapEncoding::Binary;
+            let (model, points) = formats::colmap::read_with_points(folder)?;
+            let encoding = formats::colmap::ColmapEncoding::Binary;
             std::fs::create_dir_all(folder.join("again"))?;
-            Ok(io::colmap::write(&folder.join("again"), &model, &points, encoding, true)?)
+            Ok(formats::colmap::write(&folder.join("again"), &model, &points, encoding, true)?)
         }
-        Reader::Transforms => whether(io::transforms::read(path, Some([64, 48]))),
-        Reader::Positions => whether(io::positions::read_positions(path)),
-        Reader::Control => whether(io::control::read(path)),
-        Reader::GroundPoints => whether(io::ground_points::read_ground_points(path)),
-        Reader::Similarity => whether(io::similarity::read(path)),
-        Reader::Npy => whether(io::npy::read(path)),
-        Reader::Map => whether(io::maps::read(path)),
+        Reader::Transforms => whether(formats::transforms::read(path, Some([64, 48]))),
+        Reader::Positions => whether(formats::positions::read_positions(path)),
+        Reader::Control => whether(formats::control::read(path)),
+        Reader::GroundPoints => whether(formats::ground_points::read_ground_points(path)),
+        Reader::Similarity => whether(formats::similarity::read(path)),
+        Reader::Npy => whether(formats::npy::read(path)),
+        Reader::Map => whether(formats::maps::read(path)),
         Reader::Splats => {
-            io::splat_ply::LocalOrigin::read_beside(path)?;
-            whether(io::splat_files::read(path))
+            formats::splat_ply::LocalOrigin::read_beside(path)?;
+            whether(formats::splat_files::read(path))
         }
         Reader::Corrections => whether(jobs::corrections::Corrections::read(path)),
         Reader::Opened => opened(path),
         Reader::Report => {
-            let text = io::read_regular_text(path, 1 << 26)?;
+            let text = formats::read_regular_text(path, 1 << 26)?;
             whether(serde_json::from_str::<jobs::dsm::DsmReport>(&text))
         }
         Reader::Scene => Ok(simulate::SimulationConfig::from_toml(&std::fs::read_to_string(path)?)?.validate()?),
@@ -115,7 +115,7 @@ pub(crate) fn call(reader: Reader, path: &Path) -> Outcome {
 
 fn use_rpc(rpc: &Rpc) -> Outcome {
     for format in [RpcFormat::Text, RpcFormat::Rpb, RpcFormat::Json] {
-        io::rpc::to_text(rpc, format)?;
+        formats::rpc::to_text(rpc, format)?;
     }
     let camera = RpcCamera::new(rpc.clone());
     for height_m in [rpc.height_off, -400.0, 0.0, 9000.0, 1e308] {
@@ -137,7 +137,7 @@ fn image(path: &Path) -> Outcome {
         source.read_luma(window)?;
         source.read_samples(1, window)?;
     }
-    use_rpc(&io::rpc::read_for_image(path)?.rpc)
+    use_rpc(&formats::rpc::read_for_image(path)?.rpc)
 }
 
 fn city_model(path: &Path, folder: &Path) -> Outcome {
@@ -156,7 +156,7 @@ fn city_model(path: &Path, folder: &Path) -> Outcome {
 
 /// The images of a stage that was written to a file, and a view of their geometry.
 fn opened(path: &Path) -> Outcome {
-    let opened: jobs::dsm::Opened = serde_json::from_str(&io::read_regular_text(path, 1 << 26)?)?;
+    let opened: jobs::dsm::Opened = serde_json::from_str(&formats::read_regular_text(path, 1 << 26)?)?;
     for image in &opened.images {
         image.camera.rpc.validate()?;
         let _ = image.camera.localize(ImagePoint::new(0.0, 0.0), image.camera.rpc.height_off);

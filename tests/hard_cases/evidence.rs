@@ -2,7 +2,7 @@
 
 use camera::ImagePoint;
 use crs::Crs;
-use io::raster::{Band, BandData, CogRaster, write_cog};
+use formats::raster::{Band, BandData, CogRaster, write_cog};
 use jobs::dsm::{DsmConfig, DsmError, Preset};
 use raster::{Grid, Window};
 
@@ -136,10 +136,10 @@ fn town(count: usize) -> Vec<Shot> {
     let town = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("data-samples/town");
     let shot = |number: usize| {
         let path = town.join(format!("view_{number}.tif"));
-        let source = io::raster::ImageSource::open(&path).unwrap();
+        let source = formats::raster::ImageSource::open(&path).unwrap();
         let whole = Window::whole(source.info().width, source.info().height);
         let image = source.read_luma(whole).unwrap().luma.map(|value| value.round() as u16);
-        Shot { image, rpc: io::rpc::read_for_image(&path).unwrap().rpc, no_data: None }
+        Shot { image, rpc: formats::rpc::read_for_image(&path).unwrap().rpc, no_data: None }
     };
     [1, 3, 2][..count].iter().map(|number| shot(*number)).collect()
 }

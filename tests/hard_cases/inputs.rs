@@ -2,7 +2,7 @@
 //! and a sharp image beside a coarse one. Tie points are found in each.
 
 use camera::ImagePoint;
-use io::raster::{Band, BandData, write_image_with_rpc};
+use formats::raster::{Band, BandData, write_image_with_rpc};
 use jobs::dsm::{DsmConfig, DsmReport};
 use numeric::Silent;
 use raster::{Grid, Window};

@@ -9,7 +9,7 @@
 use std::path::Path;
 
 use camera::{Lens, LensModel, Pose};
-use io::colmap::{self, ColmapEncoding, ColmapModel, ColmapView};
+use formats::colmap::{self, ColmapEncoding, ColmapModel, ColmapView};
 
 const WIDTH: usize = 480;
 const HEIGHT: usize = 360;

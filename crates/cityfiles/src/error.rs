@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use city::DefectCode;
 use numeric::failures;
 
-use io::FormatError;
-use io::atomic::SaveError;
+use formats::FormatError;
+use formats::atomic::SaveError;
 
 /// Why a city model was not read or written.
 #[derive(Debug, thiserror::Error)]

@@ -7,7 +7,7 @@
 //! Counts are checked against the size of the file before anything is allocated.
 
 use city::{CrsReference, DefectCode, Geometry, GeometryKind, ModelPoint, ObjectKind, SurfaceClass, SurfacePolygon};
-use io::ply::{PlyBody, PlyElement, PlyFault, PlyHeader};
+use formats::ply::{PlyBody, PlyElement, PlyFault, PlyHeader};
 
 use super::builder::Builder;
 use super::crs_name::crs_reference;

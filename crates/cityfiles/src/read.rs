@@ -7,8 +7,8 @@ use city::{CityModel, Defect};
 use super::error::{CityError, CityFault};
 use super::format::{CityFormat, Parsed};
 use super::{citygml, cityjson, obj, ply};
-use io::ply::looks_like_ply;
-use io::read_regular;
+use formats::ply::looks_like_ply;
+use formats::read_regular;
 
 /// Largest file that is read, bytes.
 pub const SIZE_LIMIT: u64 = 2 << 30;

@@ -11,10 +11,10 @@ use std::path::{Path, PathBuf};
 use city::{MeshConfig, ObjectStatus, TriangleMesh};
 use crs::{CrsIdentity, VerticalDatum};
 
-use io::ply::looks_like_ply;
-use io::points::{PointCloud, is_point_cloud};
-use io::splat_ply::LocalOrigin;
-use io::{FormatError, open_regular};
+use formats::ply::looks_like_ply;
+use formats::points::{PointCloud, is_point_cloud};
+use formats::splat_ply::LocalOrigin;
+use formats::{FormatError, open_regular};
 
 /// Largest number of points of a cloud.
 const POINTS_MAX: u64 = 200_000_000;

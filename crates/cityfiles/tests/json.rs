@@ -7,7 +7,7 @@ use city::{
     SurfacePolygon,
 };
 use cityfiles::{CityError, CityFile, CityFormat, CityJsonOptions, read, write_cityjson};
-use io::SaveError;
+use formats::SaveError;
 
 fn read_text(text: &str) -> Result<CityFile, CityError> {
     let folder = tempfile::tempdir().unwrap();

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use city::MeshConfig;
 use cityfiles::surfaces;
-use io::coloured_mesh::{ColouredMesh, write_mesh_ply};
+use formats::coloured_mesh::{ColouredMesh, write_mesh_ply};
 
 #[test]
 fn a_mesh_is_read_back_in_its_place() {

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use bvh::{Bvh, DepthImage, Eye, MISS, Target};
 use camera::{ImagePoint, Lens};
 use city::{MeshConfig, ModelPoint, TriangleMesh};
-use io::colmap::{self, ColmapModel};
+use formats::colmap::{self, ColmapModel};
 
 /// Offset of the reference from the coordinates of the tile.
 const OFFSET: ModelPoint = ModelPoint::new(85_320.0, 446_656.0, 0.0);

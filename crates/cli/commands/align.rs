@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use anyhow::ensure;
 use colmap::align::{AlignConfig, NoiseConfig};
 use crs::{CrsRequest, VerticalDatum};
-use io::colmap::ColmapEncoding;
+use formats::colmap::ColmapEncoding;
 use jobs::align::{AlignJobConfig, AlignJobReport, ManualAlignConfig};
 use jobs::align_page::{AlignPage, AlignPageConfig};
 use numeric::Choice;

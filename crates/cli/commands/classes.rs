@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use io::raster::BandChoice;
+use formats::raster::BandChoice;
 use jobs::classes::ClassesConfig;
 
 use crate::corrections::corrections_of;

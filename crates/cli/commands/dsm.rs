@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crs::{CrsRequest, VerticalDatum};
-use io::raster::BandChoice;
+use formats::raster::BandChoice;
 use jobs::dsm::job_file::read_dsm_job;
 use jobs::dsm::{DsmConfig, DsmError, DsmReport, Fill, HeightRange, ImagePair, LayerArea, MapBounds, Preset};
 use jobs::error::JobError;

@@ -8,8 +8,8 @@ use std::io::{BufRead, Write};
 use std::path::{Path, PathBuf};
 
 use camera::ImagePoint;
+use formats::rpc::RpcFormat;
 use geodesy::LonLatHeight;
-use io::rpc::RpcFormat;
 use jobs::rpc::{
     RpcConvertConfig, RpcDirection, RpcExportConfig, RpcInfoConfig, RpcLineAnswer, RpcLinesConfig, RpcPointsConfig,
     RpcQuery,

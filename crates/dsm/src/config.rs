@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use crs::VerticalDatum;
-use io::areas::AreaName;
-use io::raster::BandChoice;
+use formats::areas::AreaName;
+use formats::raster::BandChoice;
 use reconstruct::{Fill, HeightRange, ImagePair, MapBounds, Preset, SurfaceOptions};
 use serde::{Deserialize, Serialize};
 

@@ -135,19 +135,19 @@ pub enum DsmError {
     },
     /// The polygons of an area or of a mask cannot be used.
     #[error(transparent)]
-    Area(#[from] io::areas::AreaError),
+    Area(#[from] formats::areas::AreaError),
     /// The ground points cannot be used.
     #[error(transparent)]
-    Control(io::FormatError),
+    Control(formats::FormatError),
     /// The pointing corrections to start from cannot be read.
     #[error(transparent)]
     Corrections(JobError),
     /// An image cannot be read, or a raster cannot be written.
     #[error("cannot read the image")]
-    Image(#[from] io::raster::RasterError),
+    Image(#[from] formats::raster::RasterError),
     /// An image has no usable RPC.
     #[error("no usable RPC for an image")]
-    Rpc(#[source] Box<io::rpc::RpcReadError>),
+    Rpc(#[source] Box<formats::rpc::RpcReadError>),
     /// An RPC has no ground under its image.
     #[error("the RPC has no ground under the image; is it the RPC of this image? {}: {source}", path.display())]
     Camera {
@@ -422,7 +422,7 @@ impl DsmError {
     }
 }
 
-from_steps!(DsmError: Rpc(io::rpc::RpcReadError));
+from_steps!(DsmError: Rpc(formats::rpc::RpcReadError));
 
 impl From<FileError> for DsmError {
     fn from(error: FileError) -> Self {

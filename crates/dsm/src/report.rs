@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use camera::{ImageCorrection, ImagePoint};
-use io::stac::SunPosition;
+use formats::stac::SunPosition;
 use numeric::Choice;
 use reconstruct::{CellCounts, HeightRange, MapBounds, PairGeometry};
 use serde::{Deserialize, Serialize};

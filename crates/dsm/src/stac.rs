@@ -6,7 +6,7 @@
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use crs::{CrsError, MapProjection};
-use io::raster::iso_time;
+use formats::raster::iso_time;
 use raster::GeoTransform;
 use serde_json::{Value, json};
 

@@ -26,7 +26,7 @@ impl View {
         let scene: serde_json::Value = serde_json::from_str(&text).unwrap();
         let view = |i: usize| {
             let name = format!("view_{}.tif", i + 1);
-            let delivered = RpcCamera::new(io::rpc::read_for_image(&town(&name)).unwrap().rpc);
+            let delivered = RpcCamera::new(formats::rpc::read_for_image(&town(&name)).unwrap().rpc);
             let error = serde_json::from_value(scene["views"][i]["pointing"].clone()).unwrap();
             View { name, delivered, error }
         };
@@ -265,7 +265,7 @@ struct OpenPlace {
 /// Finds the most level places of the true surface, one in each field of a lattice.
 fn open_places(count: usize) -> Vec<OpenPlace> {
     const AROUND: usize = 30;
-    let truth = io::raster::read_dem(town("truth/dsm.tif")).unwrap();
+    let truth = formats::raster::read_dem(town("truth/dsm.tif")).unwrap();
     let projection = crs::MapProjection::from_epsg(truth.horizontal_epsg.unwrap()).unwrap();
     let (width, height) = (truth.heights.width(), truth.heights.height());
     // Greatest distance of the surroundings from the plane that fits them best.
@@ -305,7 +305,7 @@ fn open_places(count: usize) -> Vec<OpenPlace> {
 /// Cuts a chip of 35 × 35 pixels out of the second view, with its RPC or without. Returns the place
 /// of the point in it.
 fn cut_chip(path: &Path, view: &View, ground: LonLatHeight, with_rpc: bool) -> ImagePoint {
-    use io::raster::{Band, BandData, ImageSource, write_image_with_rpc};
+    use formats::raster::{Band, BandData, ImageSource, write_image_with_rpc};
     let at = view.shows(ground);
     let corner = [at.sample, at.line].map(|v| v.round() - 17.0);
     let window = raster::Window { x: corner[0] as i64, y: corner[1] as i64, width: 35, height: 35 };
@@ -315,7 +315,7 @@ fn cut_chip(path: &Path, view: &View, ground: LonLatHeight, with_rpc: bool) -> I
     if with_rpc {
         write_image_with_rpc(path, &bands, &view.delivered.rpc.cropped(origin), None, true).unwrap();
     } else {
-        io::raster::write_map(path, &bands, None, &[], true).unwrap();
+        formats::raster::write_map(path, &bands, None, &[], true).unwrap();
     }
     ImagePoint::new(at.sample - corner[0], at.line - corner[1])
 }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use crs::{Crs, MapProjection};
 use dsm::{DsmConfig, DsmError, DsmReport, LayerArea, MapBounds, Preset, run};
-use io::raster::{Band, BandChoice, BandData, CogRaster, ImageSource, write_cog, write_image_with_rpc};
+use formats::raster::{Band, BandChoice, BandData, CogRaster, ImageSource, write_cog, write_image_with_rpc};
 use numeric::Silent;
 use raster::{GeoTransform, Grid};
 
@@ -217,7 +217,7 @@ fn painted(folder: &Path, grey: Option<u16>) -> Vec<PathBuf> {
             (102..295).for_each(|row| pixels.row_mut(row)[202..412].fill(grey));
         }
         let path = folder.join(original.file_name().unwrap());
-        let rpc = io::rpc::read_for_image(&original).unwrap().rpc;
+        let rpc = formats::rpc::read_for_image(&original).unwrap().rpc;
         let bands = [Band { description: "pan", data: BandData::U16(&pixels) }];
         write_image_with_rpc(&path, &bands, &rpc, None, true).unwrap();
         path
@@ -237,7 +237,7 @@ fn masked_pixels_have_no_influence() {
     (20..60).for_each(|row| mask.row_mut(row)[40..84].fill(255));
     let file = folder.path().join("view_1_clouds.tif");
     let band = Band { description: "cloud", data: BandData::U8(&mask) };
-    io::raster::write_map(&file, &[band], None, &[], true).unwrap();
+    formats::raster::write_map(&file, &[band], None, &[], true).unwrap();
     let mut runs = [&clear, &cloudy].map(|images| {
         let mut config =
             config(images, folder.path().join(format!("out_{}", images[0].parent().unwrap().ends_with("clear"))));
@@ -262,7 +262,7 @@ fn masked_pixels_have_no_influence() {
     let wrong = Grid::filled(50, 90, 0u8);
     let write = |grid: &Grid<u8>| {
         let band = Band { description: "cloud", data: BandData::U8(grid) };
-        io::raster::write_map(&file, &[band], None, &[], true).unwrap();
+        formats::raster::write_map(&file, &[band], None, &[], true).unwrap();
     };
     write(&wrong);
     let told = run(config, &Silent).unwrap_err();
@@ -321,7 +321,7 @@ fn a_band_is_matched_by_number_or_name() {
             let bands = ["coastal", "pan", "nir"].into_iter().zip([&noise, &pixels, &noise]);
             let bands: Vec<Band<'_>> =
                 bands.map(|(description, grid)| Band { description, data: BandData::U16(grid) }).collect();
-            write_image_with_rpc(&out, &bands, &io::rpc::read_for_image(path).unwrap().rpc, None, true).unwrap();
+            write_image_with_rpc(&out, &bands, &formats::rpc::read_for_image(path).unwrap().rpc, None, true).unwrap();
             out
         })
         .collect();

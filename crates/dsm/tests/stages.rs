@@ -165,8 +165,8 @@ fn an_input_that_changes_during_the_run_is_named() {
         let folder = tempfile::tempdir().unwrap();
         let image = folder.path().join("image.tif");
         std::fs::copy(town("view_2.tif"), &image).unwrap();
-        let rpc = io::rpc::read_for_image(&image).unwrap().rpc;
-        io::rpc::write(&folder.path().join("image_RPC.TXT"), &rpc, io::rpc::RpcFormat::Text, false).unwrap();
+        let rpc = formats::rpc::read_for_image(&image).unwrap().rpc;
+        formats::rpc::write(&folder.path().join("image_RPC.TXT"), &rpc, formats::rpc::RpcFormat::Text, false).unwrap();
         let mut config = config(&folder.path().join("out"));
         (config.prior, config.chunk) = (None, chunk);
         config.images[1].clone_from(&image);

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use camera::{ImageCorrection, Rpc, RpcCamera};
-use io::rpc::RpcReadError;
+use formats::rpc::RpcReadError;
 use serde::{Deserialize, Serialize};
 
 use numeric::{Kind, Progress, failures};
@@ -111,7 +111,7 @@ struct RunReport {
 
 impl RunReport {
     fn read(path: &Path) -> Result<Self, CorrectionsError> {
-        let text = io::read_regular_text(path, files::TEXT_LIMIT)
+        let text = formats::read_regular_text(path, files::TEXT_LIMIT)
             .map_err(|source| CorrectionsError::Unreadable { path: path.to_owned(), source })?;
         serde_json::from_str(&text).map_err(|source| CorrectionsError::NotAReport { path: path.to_owned(), source })
     }
@@ -201,7 +201,7 @@ impl Corrections {
     /// # Errors
     /// [`RpcReadError`] if the image has no usable RPC.
     pub fn camera(&self, path: &Path, progress: &dyn Progress) -> Result<RpcCamera, RpcReadError> {
-        let rpc = io::rpc::read_for_image(path)?.rpc;
+        let rpc = formats::rpc::read_for_image(path)?.rpc;
         let correction = match self.find(path) {
             Some(correction) => correction,
             None => self.of_same_view(path, &rpc, progress).unwrap_or_else(|| self.for_image(path, progress)),
@@ -213,7 +213,7 @@ impl Corrections {
     /// warning.
     fn of_same_view(&self, path: &Path, rpc: &Rpc, progress: &dyn Progress) -> Option<ImageCorrection> {
         let found = self.images.iter().filter_map(|(other, correction)| {
-            let of = io::rpc::read_for_image(other).ok()?.rpc;
+            let of = formats::rpc::read_for_image(other).ok()?.rpc;
             carried(correction, &of, rpc).map(|(correction, residual_px)| (other, correction, residual_px))
         });
         let best = found.min_by(|a, b| a.2.total_cmp(&b.2))?;

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use io::splat_ply::LocalOrigin;
+use formats::splat_ply::LocalOrigin;
 use numeric::failures;
 use serde_json::Value;
 

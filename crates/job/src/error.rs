@@ -5,9 +5,9 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 use crs::{CrsError, MapProjection};
-use io::FormatError;
-use io::raster::RasterError;
-use io::rpc::RpcReadError;
+use formats::FormatError;
+use formats::raster::RasterError;
+use formats::rpc::RpcReadError;
 use numeric::{Cancelled, Failure, Kind, failures};
 
 use crate::files::FileError;

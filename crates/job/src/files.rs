@@ -4,8 +4,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use io::raster::RasterError;
-use io::{FormatError, SaveError};
+use formats::raster::RasterError;
+use formats::{FormatError, SaveError};
 use numeric::{Failure, Kind, failures};
 use serde::Serialize;
 
@@ -142,12 +142,12 @@ impl FileError {
 
 /// Fails when `path` exists and must not be replaced, so that a job stops before it computes.
 pub fn refuse_existing(path: &Path, overwrite: bool) -> Result<(), FileError> {
-    Ok(io::atomic::refuse_existing(path, overwrite)?)
+    Ok(formats::atomic::refuse_existing(path, overwrite)?)
 }
 
 /// Fails when a file cannot be written to `path`, so that a job stops before it computes.
 pub fn check_destination(path: &Path, overwrite: bool) -> Result<(), FileError> {
-    Ok(io::atomic::check_destination(path, overwrite)?)
+    Ok(formats::atomic::check_destination(path, overwrite)?)
 }
 
 /// Fails when a raster cannot be written to `path`. GDAL takes only names that are text.
@@ -180,14 +180,14 @@ pub fn move_to(from: &Path, to: &Path) -> Result<(), FileError> {
 
 /// Reads a text file.
 pub fn read_text(path: &Path) -> Result<String, FileError> {
-    io::read_regular_text(path, TEXT_LIMIT).map_err(|source| FileError::Read { path: path.to_owned(), source })
+    formats::read_regular_text(path, TEXT_LIMIT).map_err(|source| FileError::Read { path: path.to_owned(), source })
 }
 
 /// Writes a value as indented JSON with a newline at the end. The file appears complete or not at
 /// all.
 pub fn write_json(path: &Path, value: &impl Serialize, overwrite: bool) -> Result<(), FileError> {
     let text = serde_json::to_string_pretty(value)? + "\n";
-    Ok(io::write_bytes(path, text.as_bytes(), overwrite)?)
+    Ok(formats::write_bytes(path, text.as_bytes(), overwrite)?)
 }
 
 /// Returns the names of everything in a folder; nothing where there is none.

@@ -62,7 +62,8 @@ fn images_in(folder: &Path) -> Result<Vec<PathBuf>, String> {
     let mut named: Vec<PathBuf> =
         entries.flatten().map(|entry| entry.path()).filter(|path| is_named_so(path)).collect();
     named.sort();
-    let images: Vec<PathBuf> = named.iter().filter(|path| io::rpc::read_for_image(path).is_ok()).cloned().collect();
+    let images: Vec<PathBuf> =
+        named.iter().filter(|path| formats::rpc::read_for_image(path).is_ok()).cloned().collect();
     if images.is_empty() {
         return Err(format!(
             "the folder holds no image with an RPC ({} rasters without); give the images, or a folder of them: {}",

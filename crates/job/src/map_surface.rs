@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crs::{CrsError, HeightConverter, MapProjection, VerticalDatum};
-use io::raster::{Dem, read_dem};
+use formats::raster::{Dem, read_dem};
 use numeric::{Progress, failures};
 
 use crate::error::{JobError, from_failures};

@@ -3,8 +3,8 @@
 
 use std::path::{Path, PathBuf};
 
-use io::colmap::ColmapModel;
-use io::splat_ply::LocalOrigin;
+use formats::colmap::ColmapModel;
+use formats::splat_ply::LocalOrigin;
 use numeric::{Kind, failures};
 
 use crate::dataset_folder::{UNKNOWN_DATUM, UNKNOWN_FRAME, dataset_folder, dataset_origin, sparse_folder};
@@ -53,12 +53,12 @@ from_failures!(PlacedModelError);
 /// [`JobError`] if the model or its origin cannot be read, or if it lies on another map.
 pub fn read(folder: &Path, origin: &LocalOrigin) -> Result<ColmapModel, JobError> {
     let sparse = sparse_folder(folder);
-    let mut model = io::colmap::read(&sparse)?;
+    let mut model = formats::colmap::read(&sparse)?;
     let path = sparse.join("origin.json");
     let of_dataset = dataset_origin(&dataset_folder(&sparse))?;
     // A model that is given by itself has a place on a map.
     let own: LocalOrigin = if path.is_file() || (sparse == folder && of_dataset.crs == UNKNOWN_FRAME) {
-        let text = io::read_regular_text(&path, crate::files::TEXT_LIMIT)
+        let text = formats::read_regular_text(&path, crate::files::TEXT_LIMIT)
             .map_err(|source| PlacedModelError::NoOrigin { path: path.clone(), source })?;
         serde_json::from_str(&text).map_err(|source| PlacedModelError::NotAnOrigin { path, source })?
     } else {

@@ -9,7 +9,7 @@ const GRIDS_VARIABLE: &str = "PROJ_NETWORK_ENDPOINT";
 /// Lets jobs read rasters whose names in a configuration are addresses (`https://…`). Without this
 /// such a name is an error. An address inside a file is never followed, with or without it.
 pub fn allow_remote() {
-    io::raster::allow_remote();
+    formats::raster::allow_remote();
 }
 
 /// Lets jobs fetch the geoid grids that PROJ does not find from <https://cdn.proj.org>, or from the
@@ -26,7 +26,7 @@ fn fetch_grid(name: &str, folder: &Path) -> Result<(), String> {
     let place = std::env::var(GRIDS_VARIABLE).unwrap_or_else(|_| GRIDS.to_owned());
     let address = format!("{}/{name}", place.trim_end_matches('/'));
     std::fs::create_dir_all(folder).map_err(|error| format!("cannot make a folder ({error}): {}", folder.display()))?;
-    let bytes = io::download(&address, &folder.join(name))?;
+    let bytes = formats::download(&address, &folder.join(name))?;
     tracing::warn!("fetched {address} ({} kB) into {}", bytes.div_ceil(1000), folder.display());
     Ok(())
 }

@@ -40,7 +40,7 @@ pub fn write_page(path: &Path, page: &JobPage, report: &impl Serialize, overwrit
     let file = page_file(path);
     let html =
         page.html().map_err(|e| FileError::Unwritable { path: file.clone(), source: std::io::Error::other(e) })?;
-    io::write_bytes(&file, html.as_bytes(), overwrite)?;
+    formats::write_bytes(&file, html.as_bytes(), overwrite)?;
     files::write_json(path, report, overwrite)
 }
 
@@ -71,7 +71,7 @@ pub fn write_styles<'a>(
 ) -> Result<(), FileError> {
     for (name, layer) in layers {
         if let Some(legend) = &layer.legend {
-            io::write_bytes(folder.join(name), legend.qml().as_bytes(), false)?;
+            formats::write_bytes(folder.join(name), legend.qml().as_bytes(), false)?;
         }
     }
     Ok(())

@@ -70,7 +70,7 @@ pub fn refresh(run: &Path) -> Result<(), FileError> {
     let Ok(old) = read_text(&path) else { return Ok(()) };
     let links = links("../", PAGE, |name| run.join(name).is_file());
     match with_links(&old, &links) {
-        Some(new) if new != old => Ok(io::write_bytes(&path, new.as_bytes(), true)?),
+        Some(new) if new != old => Ok(formats::write_bytes(&path, new.as_bytes(), true)?),
         _ => Ok(()),
     }
 }

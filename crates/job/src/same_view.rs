@@ -71,7 +71,7 @@ mod tests {
 
     fn rpc(view: usize) -> Rpc {
         let town = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../data-samples/town"));
-        io::rpc::read_for_image(&town.join(format!("view_{view}.tif"))).unwrap().rpc
+        formats::rpc::read_for_image(&town.join(format!("view_{view}.tif"))).unwrap().rpc
     }
 
     /// The multispectral image has a quarter of the resolution and begins elsewhere.

@@ -170,7 +170,7 @@ fn fast_paths() -> &'static str {
 
 /// Looks for the drivers of GDAL.
 fn formats() -> Result<(SelftestState, String), String> {
-    let known = io::raster::raster_formats();
+    let known = formats::raster::raster_formats();
     let has = |name: &&str| known.iter().any(|known| known == name);
     let missing: Vec<&str> = REQUIRED.into_iter().filter(|name| !has(name)).collect();
     if !missing.is_empty() {
@@ -232,7 +232,7 @@ fn surface(folder: Option<&Path>) -> Result<(SelftestState, String), String> {
     scenes::simulate::run(&SimulateConfig::new(scene, at("town")), &Silent).map_err(|e| with_causes(&e))?;
     let images: Vec<PathBuf> = (1..=3).map(|view| at(&format!("town/view_{view}.tif"))).collect();
     let truth = at("town/truth/dsm.tif");
-    let known = io::raster::read_dem(&truth).map_err(|e| with_causes(&e))?;
+    let known = formats::raster::read_dem(&truth).map_err(|e| with_causes(&e))?;
     let heights = known.heights.data().iter().filter(|height| height.is_finite()).map(|height| f64::from(*height));
     let [low, high] = heights.fold([f64::MAX, f64::MIN], |[low, high], h| [low.min(h), high.max(h)]);
     for (name, threads) in [("one", Some(1)), ("all", None)] {

@@ -9,8 +9,8 @@ use std::time::Duration;
 
 use camera::Similarity;
 use crs::VerticalDatum;
-use io::colmap::{ColmapEncoding, ColmapModel, ColmapPoint, ColmapView, read_with_points};
-use io::splat_ply::LocalOrigin;
+use formats::colmap::{ColmapEncoding, ColmapModel, ColmapPoint, ColmapView, read_with_points};
+use formats::splat_ply::LocalOrigin;
 use jobs::align::{AlignJobConfig, ManualAlignConfig};
 use jobs::align_page::{AlignPage, AlignPageConfig};
 use numeric::{CancelFlag, Cancellable, Silent};
@@ -31,7 +31,7 @@ fn town_cameras() -> ColmapModel {
 /// Writes a model, and returns the similarity from it to the world.
 fn planted(folder: &Path) -> Similarity {
     let cameras = town_cameras();
-    let dem = io::raster::read_dem(map()).unwrap();
+    let dem = formats::raster::read_dem(map()).unwrap();
     let (x, y) = dem.geotransform.map_from_cell(320.0, 320.0);
     let turn = [[0.36, 0.48, 0.8], [-0.8, 0.6, 0.0], [-0.48, -0.64, 0.6]];
     let world = Similarity::new(4.0, turn, [x, y, 200.0]).unwrap();
@@ -50,7 +50,7 @@ fn planted(folder: &Path) -> Similarity {
 
 fn write(folder: &Path, model: &ColmapModel, points: &[ColmapPoint]) {
     std::fs::create_dir_all(folder).unwrap();
-    io::colmap::write(folder, model, points, ColmapEncoding::Binary, false).unwrap();
+    formats::colmap::write(folder, model, points, ColmapEncoding::Binary, false).unwrap();
 }
 
 struct Client {
@@ -177,7 +177,7 @@ fn clicked_pairs_bring_the_model_back_and_are_saved() {
     let out = folder.path().join("out");
     let origin: LocalOrigin = serde_json::from_slice(&std::fs::read(out.join("origin.json")).unwrap()).unwrap();
     assert_eq!((origin.crs.as_str(), origin.vertical.as_str()), ("EPSG:32631", "ellipsoid"));
-    let similarity = io::similarity::read(out.join("similarity.json")).unwrap();
+    let similarity = formats::similarity::read(out.join("similarity.json")).unwrap();
     let (_, after) = read_with_points(&out).unwrap();
     for (before, after) in points.iter().zip(&after) {
         assert!(apart(plus(after.position, origin.origin), world.apply(before.position)) < 1e-5);
@@ -234,7 +234,7 @@ fn requests_that_mean_nothing_are_refused_in_words() {
 #[test]
 fn many_points_are_thinned_and_an_aligned_model_stays() {
     let folder = tempfile::tempdir().unwrap();
-    let dem = io::raster::read_dem(map()).unwrap();
+    let dem = formats::raster::read_dem(map()).unwrap();
     let (x, y) = dem.geotransform.map_from_cell(50.0, 50.0);
     let point = |i: u32| {
         let position = [x + f64::from(i % 7), y + f64::from(i % 5), 190.0];

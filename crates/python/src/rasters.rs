@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use crs::{Crs, CrsIdentity, HeightConverter, MapProjection, VerticalDatum, compound_wkt, horizontal_wkt};
 use eval::{MetresFromCells, bilinear, nearest};
-use io::raster::{Band, BandData, CogCrs, CogRaster, ImageSource, undeclared_no_data, write_cog};
+use formats::raster::{Band, BandData, CogCrs, CogRaster, ImageSource, undeclared_no_data, write_cog};
 use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray1};
 use pyo3::prelude::*;
 use raster::{GeoTransform, Grid, Window};

@@ -7,8 +7,8 @@ use std::borrow::Cow;
 use std::path::PathBuf;
 
 use camera::{Correspondence, ImagePoint, Rpc, RpcCamera, RpcFit};
+use formats::rpc::RpcFormat;
 use geodesy::LonLatHeight;
-use io::rpc::RpcFormat;
 use numpy::{PyReadonlyArray1, PyReadwriteArray1};
 use pyo3::prelude::*;
 use rayon::prelude::*;
@@ -66,7 +66,7 @@ impl RpcCore {
     /// warnings.
     #[staticmethod]
     fn read(py: Python<'_>, path: PathBuf) -> PyResult<(Self, String, PathBuf, Vec<String>)> {
-        let file = py.detach(|| io::rpc::read(&path)).map_err(|e| raise_about(py, &e.into(), &[&path]))?;
+        let file = py.detach(|| formats::rpc::read(&path)).map_err(|e| raise_about(py, &e.into(), &[&path]))?;
         let format = serde_json::to_value(file.format).map(|v| v.as_str().unwrap_or_default().to_owned());
         let format = format.map_err(|e| raise(py, &json_error(&e)))?;
         Ok((Self { camera: RpcCamera::new(file.rpc) }, format, file.source, file.warnings))
@@ -199,13 +199,13 @@ impl RpcCore {
     /// The text of an RPC file.
     fn text(&self, py: Python<'_>, format: &str) -> PyResult<String> {
         let format = format_of(py, format)?;
-        io::rpc::to_text(&self.camera.rpc, format).map_err(|e| raise(py, &e.into()))
+        formats::rpc::to_text(&self.camera.rpc, format).map_err(|e| raise(py, &e.into()))
     }
 
     /// Writes an RPC file.
     fn write(&self, py: Python<'_>, path: PathBuf, format: &str, overwrite: bool) -> PyResult<()> {
         let format = format_of(py, format)?;
-        let written = io::rpc::write(&path, &self.camera.rpc, format, overwrite);
+        let written = formats::rpc::write(&path, &self.camera.rpc, format, overwrite);
         written.map_err(|e| raise_about(py, &e.into(), &[&path]))
     }
 }

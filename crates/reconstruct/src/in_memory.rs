@@ -171,8 +171,8 @@ mod tests {
         let view = |number: u8| {
             let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../data-samples/town"));
             let path = folder.join(format!("view_{number}.tif"));
-            let camera = RpcCamera::new(io::rpc::read_for_image(&path).unwrap().rpc);
-            let source = io::raster::ImageSource::open(&path).unwrap();
+            let camera = RpcCamera::new(formats::rpc::read_for_image(&path).unwrap().rpc);
+            let source = formats::raster::ImageSource::open(&path).unwrap();
             let window = Window::whole(source.info().width, source.info().height);
             ViewImage { camera, pixels: source.read_luma(window).unwrap().luma }
         };

@@ -17,13 +17,13 @@ use ::simulate::{
 use camera::{LensError, Pose};
 use cityfiles::{CityJsonOptions, write_cityjson};
 use crs::Crs;
-use io::colmap::{self, ColmapEncoding, ColmapModel, ColmapObservation, ColmapPoint, ColmapView};
-use io::ply::{PlyPoint, write_points};
-use io::raster::{
+use formats::colmap::{self, ColmapEncoding, ColmapModel, ColmapObservation, ColmapPoint, ColmapView};
+use formats::ply::{PlyPoint, write_points};
+use formats::raster::{
     Band, BandData, BandSpectrum, CogRaster, write_cog, write_image_with_rpc, write_multispectral_with_rpc,
     write_png_gray,
 };
-use io::splat_ply::LocalOrigin;
+use formats::splat_ply::LocalOrigin;
 use numeric::{Cancelled, Kind, Progress, failures};
 use raster::Grid;
 use serde::{Deserialize, Serialize};
@@ -310,7 +310,7 @@ impl SceneWriter<'_> {
         // The parameters and the record of an earlier simulation are replaced: the folder was
         // checked at the start.
         let parameters = self.simulation.config.to_toml()?;
-        io::write_bytes(self.folder.join(PARAMETERS), parameters.as_bytes(), true).map_err(FileError::write)?;
+        formats::write_bytes(self.folder.join(PARAMETERS), parameters.as_bytes(), true).map_err(FileError::write)?;
         Ok(simulate_page::write(&self.folder.join(RECORD), &self.simulation.record(), truth)?)
     }
 
@@ -371,7 +371,7 @@ impl SceneWriter<'_> {
             };
             let exact = self.simulation.exact_view(lens, &view.pose);
             let shape = [exact.depth_m.height(), exact.depth_m.width()];
-            io::npy::write(path("depth", "npy")?, &shape, exact.depth_m.data(), self.overwrite)
+            formats::npy::write(path("depth", "npy")?, &shape, exact.depth_m.data(), self.overwrite)
                 .map_err(FileError::write)?;
             write_png_gray(path("part", "png")?, &exact.part, self.overwrite).map_err(FileError::write)?;
             let picture = self.simulation.flight_picture(lens, &view.pose, &numeric::Silent);

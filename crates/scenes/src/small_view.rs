@@ -2,7 +2,7 @@
 
 use ::train::PinholeView;
 use camera::Lens;
-use io::colmap::ColmapView;
+use formats::colmap::ColmapView;
 
 /// Returns the view of a pinhole camera whose image is smaller by a factor; `None` for other
 /// lenses.

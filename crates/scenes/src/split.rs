@@ -4,8 +4,8 @@
 use std::path::PathBuf;
 
 use colmap::split::{ChosenView, SplitConfig, SplitError, points_of_views, split};
-use io::FormatError;
-use io::colmap::{ColmapModel, ColmapPoint};
+use formats::FormatError;
+use formats::colmap::{ColmapModel, ColmapPoint};
 use serde::{Deserialize, Serialize};
 
 use job::error::{JobError, from_steps, job_errors};
@@ -151,7 +151,7 @@ fn steps(config: &SplitJobConfig, progress: &dyn Progress) -> Result<SplitJobRep
         report_page::refuse_existing(path, config.overwrite)?;
     }
     progress.begin("split", 2);
-    let (model, points) = io::colmap::read_with_points(&config.model)?;
+    let (model, points) = formats::colmap::read_with_points(&config.model)?;
     progress.step();
     progress.check_cancelled()?;
     let points = points_by_view(&model, &points);

@@ -6,7 +6,7 @@
 
 use std::path::{Path, PathBuf};
 
-use io::positions::Position;
+use formats::positions::Position;
 use numeric::failures;
 use serde::{Deserialize, Serialize};
 
@@ -161,7 +161,7 @@ impl StandConfig {
 }
 
 fn read(path: &Path) -> Result<CameraFile, StandError> {
-    let text = io::read_regular_text(path, job::files::TEXT_LIMIT)
+    let text = formats::read_regular_text(path, job::files::TEXT_LIMIT)
         .map_err(|source| StandError::Unreadable { path: path.to_owned(), source })?;
     serde_json::from_str(&text).map_err(|source| StandError::NotACamera { path: path.to_owned(), source })
 }

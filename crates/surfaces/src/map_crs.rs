@@ -2,7 +2,7 @@
 //! on maps of their own, which have no code.
 
 use crs::{Crs, CrsError, MapProjection};
-use io::raster::{CogCrs, Dem};
+use formats::raster::{CogCrs, Dem};
 
 /// The horizontal CRS of a surface model.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,7 +1,7 @@
 //! Layers that lie beside a surface model, on its cells.
 
 use eval::CellOrigin;
-use io::raster::{Dem, ImageSource, RasterError};
+use formats::raster::{Dem, ImageSource, RasterError};
 use raster::Grid;
 
 /// Where each height comes from.

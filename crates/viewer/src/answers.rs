@@ -18,7 +18,7 @@
 //! A grid begins with its columns and rows (u32), followed by f32 in rows; all little-endian, NaN
 //! is no-data. Values are those of the cells of the raster, never interpolated.
 
-use io::raster::{ImageSource, RasterError};
+use formats::raster::{ImageSource, RasterError};
 use raster::{Grid, Window};
 use report::{MapStyle, png_with_alpha};
 use serde::Serialize;

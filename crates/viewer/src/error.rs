@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
-use io::FormatError;
-use io::areas::AreaError;
-use io::raster::RasterError;
+use formats::FormatError;
+use formats::areas::AreaError;
+use formats::raster::RasterError;
 use numeric::{Kind, failures};
 
 use job::error::{JobError, SettingError, from_steps, job_errors};

@@ -1,7 +1,7 @@
 //! The frame of the map for a job that works on it: its coordinate system, its extent and its
 //! ground.
 
-use io::raster::{ImageSource, RasterError};
+use formats::raster::{ImageSource, RasterError};
 use numeric::upper_median;
 
 use super::scene::{MapSystem, Scene, reduced};

@@ -12,7 +12,7 @@
 //! Labels are the numbers of the objects of all splats (u32), and after them those of their classes
 //! (u8).
 
-use io::splat_ply::SplatFile;
+use formats::splat_ply::SplatFile;
 
 /// Bytes of a texel.
 const TEXEL: usize = 16;

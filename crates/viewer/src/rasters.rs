@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use io::vectors::is_vector_name;
+use formats::vectors::is_vector_name;
 
 use super::error::ViewError;
 

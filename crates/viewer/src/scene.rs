@@ -9,7 +9,7 @@
 use std::path::PathBuf;
 
 use crs::{CrsIdentity, MapProjection};
-use io::raster::{BandLabel, ImageInfo, ImageSource, RasterError};
+use formats::raster::{BandLabel, ImageInfo, ImageSource, RasterError};
 use numeric::Progress;
 use raster::{GeoTransform, Grid, Window};
 use report::{MapLegend, MapStyle};

@@ -4,9 +4,9 @@
 
 use std::path::{Path, PathBuf};
 
+use formats::splat_files::SplatFormat;
+use formats::splat_ply::{LocalOrigin, SplatFile, SplatForm};
 use hyper::body::Bytes;
-use io::splat_files::SplatFormat;
-use io::splat_ply::{LocalOrigin, SplatFile, SplatForm};
 use numeric::Progress;
 use serde::Serialize;
 use serde_json::Value;
@@ -199,7 +199,7 @@ impl Space {
             self.meshes.push(SpaceMesh { name, shift, bytes });
             return Ok(());
         }
-        let file: SplatFile = io::splat_files::read(path)?;
+        let file: SplatFile = formats::splat_files::read(path)?;
         let known: usize = self.splats.iter().map(|layer| layer.count).sum();
         let found = known + file.splats.len();
         if found > SPLATS_MAX {
@@ -257,7 +257,7 @@ impl Space {
             let crs = self.crs.clone().unwrap_or_else(|| UNKNOWN_FRAME.to_owned());
             placed_model::read(folder, &LocalOrigin::new(crs, self.vertical.clone(), self.origin))?
         } else {
-            io::colmap::read(&sparse)?
+            formats::colmap::read(&sparse)?
         };
         for view in model.views {
             let Some(lens) = model.lenses.get(view.lens) else { continue };
@@ -280,7 +280,7 @@ impl Space {
 
 /// Returns the names of the views that a training held out.
 fn held_out(folder: &Path) -> Vec<String> {
-    let text = io::read_regular_text(&folder.join("report.json"), REPORT_MAX);
+    let text = formats::read_regular_text(&folder.join("report.json"), REPORT_MAX);
     let report: Value = text.ok().and_then(|text| serde_json::from_str(&text).ok()).unwrap_or_default();
     let views = report["views"].as_array().into_iter().flatten();
     let held = views.filter(|view| view["held_out"] == true);
@@ -310,6 +310,6 @@ fn kind(path: &Path) -> Option<Kind> {
 fn starts_with(path: &Path, length: usize, word: &str) -> bool {
     use std::io::Read;
     let mut head = Vec::new();
-    let read = io::open_regular(path).and_then(|file| file.take(length as u64).read_to_end(&mut head));
+    let read = formats::open_regular(path).and_then(|file| file.take(length as u64).read_to_end(&mut head));
     read.is_ok() && head.windows(word.len()).any(|part| part == word.as_bytes())
 }

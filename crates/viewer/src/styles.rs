@@ -1,7 +1,7 @@
 //! How the layers of a raster look: from the name of the file, and the description, the sample type
 //! and the values of its band.
 
-use io::raster::{BandLabel, ImageInfo, LumaRule, SampleType};
+use formats::raster::{BandLabel, ImageInfo, LumaRule, SampleType};
 use raster::{Grid, height_percentiles};
 use report::{Legend, MapClass, MapStyle, RampColours};
 

@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use crs::MapProjection;
-use io::vectors::{VectorFeature, VectorKind, VectorLayer, read_vectors};
+use formats::vectors::{VectorFeature, VectorKind, VectorLayer, read_vectors};
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 

@@ -132,7 +132,7 @@ fn the_page_and_the_data_of_a_job_are_there_with_it_only() {
 fn the_frame_of_the_map_is_that_of_its_raster() {
     let frame: MapFrame = opened().map_frame().unwrap().unwrap();
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../data-samples/town/truth/dsm.tif");
-    let dem = io::raster::read_dem(&path).unwrap();
+    let dem = formats::raster::read_dem(&path).unwrap();
     let (x, y) = dem.geotransform.map_from_cell(-0.5, -0.5);
     assert_eq!((frame.bounds[0], frame.bounds[3], frame.epsg), (x, y, dem.horizontal_epsg));
     let mut heights: Vec<f64> = dem.heights.data().iter().map(|h| f64::from(*h)).filter(|h| h.is_finite()).collect();

@@ -6,9 +6,9 @@ use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::path::{Path, PathBuf};
 
+use formats::colmap::{ColmapEncoding, ColmapModel, ColmapView};
+use formats::splat_ply::{LabelTable, LabelledObject, LocalOrigin, SplatFile, SplatForm, SplatLabels, SplatLayout};
 use gaussian::{Splat, SplatHarmonics, SplatLabel};
-use io::colmap::{ColmapEncoding, ColmapModel, ColmapView};
-use io::splat_ply::{LabelTable, LabelledObject, LocalOrigin, SplatFile, SplatForm, SplatLabels, SplatLayout};
 use numeric::{CancelFlag, Cancellable, Failure, Kind, Silent};
 use serde_json::Value;
 use viewer::{ViewConfig, ViewServer};
@@ -65,7 +65,7 @@ fn origin(x: f64) -> LocalOrigin {
 fn folders(folder: &Path) -> [PathBuf; 2] {
     let [training, dataset] = ["training", "dataset"].map(|name| folder.join(name));
     fs::create_dir_all(&training).unwrap();
-    io::splat_files::write(&training.join("splats.ply"), &splats(Some(origin(690_000.0))), false).unwrap();
+    formats::splat_files::write(&training.join("splats.ply"), &splats(Some(origin(690_000.0))), false).unwrap();
     fs::write(training.join("mesh.glb"), b"glTF and more").unwrap();
     fs::write(training.join("points.ply"), b"ply\nformat ascii 1.0\nelement vertex 0\nend_header\n").unwrap();
     fs::write(training.join("report.json"), r#"{"views": [{"name": "b.png", "held_out": true}]}"#).unwrap();
@@ -76,7 +76,7 @@ fn folders(folder: &Path) -> [PathBuf; 2] {
     let model = ColmapModel { lenses: vec![lens], views: vec![view(1, "b.png"), view(2, "a.png")] };
     let sparse = dataset.join("sparse/0");
     fs::create_dir_all(&sparse).unwrap();
-    io::colmap::write(&sparse, &model, &[], ColmapEncoding::Text, false).unwrap();
+    formats::colmap::write(&sparse, &model, &[], ColmapEncoding::Text, false).unwrap();
     fs::write(sparse.join("origin.json"), serde_json::to_string(&origin(690_010.0)).unwrap()).unwrap();
     [training, dataset]
 }
@@ -137,8 +137,8 @@ fn labels_come_with_their_table() {
     let objects = vec![LabelledObject { number: 300, id, kind, building, attributes }];
     let table = LabelTable { classes: [(2, "RoofSurface".to_owned())].into(), objects, ..LabelTable::default() };
     let labels = Some(SplatLabels { of: vec![roof, wall, SplatLabel::NONE], table });
-    io::splat_files::write(&labelled, &SplatFile { labels, ..splats(None) }, false).unwrap();
-    io::splat_files::write(&bare, &splats(None), false).unwrap();
+    formats::splat_files::write(&labelled, &SplatFile { labels, ..splats(None) }, false).unwrap();
+    formats::splat_files::write(&bare, &splats(None), false).unwrap();
     served(&[labelled, bare], |get| {
         let scene: Value = serde_json::from_slice(&get("/space.json").1).unwrap();
         let is_labelled = |i: usize| scene["splats"][i]["labelled"].as_bool();
@@ -160,10 +160,10 @@ fn labels_come_with_their_table() {
 fn splats_lie_beside_a_map_and_files_of_other_maps_are_left_out() {
     let folder = tempfile::tempdir().unwrap();
     let [first, second, foreign] = ["a.spz", "b.ply", "c.ply"].map(|name| folder.path().join(name));
-    io::splat_files::write(&first, &splats(Some(origin(690_000.0))), false).unwrap();
-    io::splat_files::write(&second, &splats(Some(origin(690_100.0))), false).unwrap();
+    formats::splat_files::write(&first, &splats(Some(origin(690_000.0))), false).unwrap();
+    formats::splat_files::write(&second, &splats(Some(origin(690_100.0))), false).unwrap();
     let elsewhere = LocalOrigin::new("EPSG:32632", "ellipsoid", [0.0; 3]);
-    io::splat_files::write(&foreign, &splats(Some(elsewhere)), false).unwrap();
+    formats::splat_files::write(&foreign, &splats(Some(elsewhere)), false).unwrap();
     let dsm = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../data-samples/town/truth/dsm.tif");
     served(&[dsm, first, second, foreign], |get| {
         assert!(String::from_utf8(get("/").1).unwrap().contains("to-space"));
@@ -215,7 +215,7 @@ fn a_browser_opens_splats_without_complaint() {
     };
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("splats.spz");
-    io::splat_files::write(&path, &splats(Some(origin(690_000.0))), false).unwrap();
+    formats::splat_files::write(&path, &splats(Some(origin(690_000.0))), false).unwrap();
     let viewer = ViewServer::open(&ViewConfig::new(vec![path]), &Silent).unwrap();
     let shown = answering(&viewer, || {
         let mut command = std::process::Command::new(browser);

@@ -6,7 +6,7 @@ use std::net::TcpStream;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use io::raster::{ImageSource, read_dem};
+use formats::raster::{ImageSource, read_dem};
 use numeric::{CancelFlag, Cancellable, Failure, Kind, Silent};
 use raster::{Grid, Window};
 use serde_json::Value;
@@ -331,15 +331,15 @@ fn other_systems_and_vectors_are_laid_into_the_map() {
     let cells = Grid::from_vec(64, 64, (0..4096).map(|i| (i % 64) as f32).collect()).unwrap();
     let transform = raster::GeoTransform([lon - 32.0 * step, step, 0.0, lat + 32.0 * step, 0.0, -step]);
     let other = folder.path().join("degrees.tif");
-    let bands = [io::raster::Band { description: "height_m", data: io::raster::BandData::F32(&cells) }];
-    let placed = io::raster::CogRaster::new(&bands, transform, crs::Crs::ellipsoidal(4326));
-    io::raster::write_cog(&other, &placed, false).unwrap();
+    let bands = [formats::raster::Band { description: "height_m", data: formats::raster::BandData::F32(&cells) }];
+    let placed = formats::raster::CogRaster::new(&bands, transform, crs::Crs::ellipsoidal(4326));
+    formats::raster::write_cog(&other, &placed, false).unwrap();
     let classes = folder.path().join("classes.tif");
     let codes = cells.map(|value| if *value < 32.0 { 2u8 } else { 6 });
     let description = "class_2_ground_3_low_vegetation_5_vegetation_6_building_9_water";
-    let bands = [io::raster::Band { description, data: io::raster::BandData::U8(&codes) }];
-    let placed = io::raster::CogRaster::new(&bands, transform, crs::Crs::ellipsoidal(4326));
-    io::raster::write_cog(&classes, &placed, false).unwrap();
+    let bands = [formats::raster::Band { description, data: formats::raster::BandData::U8(&codes) }];
+    let placed = formats::raster::CogRaster::new(&bands, transform, crs::Crs::ellipsoidal(4326));
+    formats::raster::write_cog(&classes, &placed, false).unwrap();
     let lines = folder.path().join("changes.geojson");
     let feature = format!(
         r#"{{"type":"Feature","properties":{{"mean_m":-2.5,"area_m2":81}},"geometry":{{"type":"Polygon",

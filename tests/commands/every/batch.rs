@@ -79,14 +79,14 @@ fn inputs(folder: &Path) {
     let map = crs::MapProjection::from_epsg(32631).unwrap();
     let (west, south) = map.lonlat_from_map(693_900.0, 4_822_430.0).unwrap();
     write_area(&folder.join("water.geojson"), [west, south, west + 4e-4, south + 3e-4]);
-    io::raster::write_png_gray(folder.join("plain.png"), &raster::Grid::filled(64, 64, 7), false).unwrap();
+    formats::raster::write_png_gray(folder.join("plain.png"), &raster::Grid::filled(64, 64, 7), false).unwrap();
     let bytes = std::fs::read(sample("view_2.tif")).unwrap();
     std::fs::write(folder.join("corrupt.tif"), &bytes[..bytes.len() / 2]).unwrap();
-    let mut rpc = io::rpc::read_for_image(&sample("view_3.tif")).unwrap().rpc;
+    let mut rpc = formats::rpc::read_for_image(&sample("view_3.tif")).unwrap().rpc;
     rpc.long_off += 0.5;
     let pixels = raster::Grid::filled(722, 752, 100u16);
-    let bands = [io::raster::Band { description: "pan", data: io::raster::BandData::U16(&pixels) }];
-    io::raster::write_image_with_rpc(folder.join("far.tif"), &bands, &rpc, None, false).unwrap();
+    let bands = [formats::raster::Band { description: "pan", data: formats::raster::BandData::U16(&pixels) }];
+    formats::raster::write_image_with_rpc(folder.join("far.tif"), &bands, &rpc, None, false).unwrap();
 }
 
 /// Runs a batch to its end and returns its report.
@@ -232,7 +232,7 @@ fn killed_again_and_again_a_batch_ends_as_if_it_had_been_left_alone() {
     let page = std::fs::read_to_string(night.join("batch_report.html")).unwrap();
     assert!(page.contains("share no ground"), "{page}");
     // The corner of the area. A polygon of longitudes and latitudes is not level on the map.
-    let dsm = io::raster::read_dem(night.join("both/dsm/dsm.tif")).unwrap();
+    let dsm = formats::raster::read_dem(night.join("both/dsm/dsm.tif")).unwrap();
     let corner = crs::MapProjection::from_epsg(32631).unwrap().map_from_lonlat(5.398, 43.531).unwrap();
     let (x, y) = dsm.geotransform.map_from_cell(-0.5, -0.5);
     assert!((x - corner.x).abs() < 15.0 && (y - corner.y).abs() < 15.0, "{x} {y} {corner:?}");

@@ -7,7 +7,7 @@ use std::path::Path;
 use crate::common::{band, sample, skysweep};
 use assert_cmd::Command;
 use crs::Crs;
-use io::raster::{Band, BandData, CogRaster, read_dem, write_cog};
+use formats::raster::{Band, BandData, CogRaster, read_dem, write_cog};
 use predicates::prelude::*;
 
 /// Runs a command that must fail with exit code 2, and returns its standard error.

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use crate::common::{sample, skysweep};
 use crs::Crs;
-use io::raster::{Band, BandData, CogRaster, write_cog};
+use formats::raster::{Band, BandData, CogRaster, write_cog};
 use predicates::prelude::PredicateBooleanExt as _;
 use predicates::str::contains;
 use raster::{GeoTransform, Grid};

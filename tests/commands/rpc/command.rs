@@ -124,7 +124,7 @@ fn convert_keeps_every_number_in_every_format() {
     for (from, to) in [("a_RPC.TXT", "b.RPB"), ("b.RPB", "c.json"), ("c.json", "d_RPC.TXT")] {
         skysweep(&folder).args(["convert", from, "-o", to]).assert().success().stdout("").stderr("");
     }
-    let read = |name: &str| io::rpc::read(&folder.path().join(name)).expect("the written file").rpc;
+    let read = |name: &str| formats::rpc::read(&folder.path().join(name)).expect("the written file").rpc;
     let (first, last) = (read("a_RPC.TXT"), read("d_RPC.TXT"));
     // RPB has no way to leave the errors out.
     assert_eq!(last, camera::Rpc { err_bias_m: Some(0.0), err_rand_m: Some(0.0), ..first });
@@ -138,7 +138,7 @@ fn convert_replaces_only_when_told_to() {
     skysweep(&folder).args(convert).assert().code(2).stderr(predicate::str::contains("--overwrite"));
     assert_eq!(std::fs::read_to_string(folder.path().join("b.json")).expect("still there"), "mine");
     skysweep(&folder).args(convert).arg("--overwrite").assert().success();
-    assert!(io::rpc::read(&folder.path().join("b.json")).is_ok());
+    assert!(formats::rpc::read(&folder.path().join("b.json")).is_ok());
 }
 
 #[test]
@@ -185,7 +185,7 @@ fn a_run_becomes_a_dataset_of_images_and_cameras() {
     let folder = TempDir::new().unwrap();
     let town = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("data-samples/town");
     let views: Vec<_> = (1..=3).map(|view| town.join(format!("view_{view}.tif"))).collect();
-    let truth = io::raster::read_dem(town.join("truth/dsm.tif")).unwrap();
+    let truth = formats::raster::read_dem(town.join("truth/dsm.tif")).unwrap();
     let (x, y) = truth.geotransform.map_from_cell(100.0, 300.0);
     let bounds = [x, y, x + 60.0, y + 60.0].map(|side| format!("{side:.0}"));
     let mut dsm = Command::cargo_bin("skysweep").unwrap();
@@ -208,7 +208,7 @@ fn a_run_becomes_a_dataset_of_images_and_cameras() {
     assert_eq!((&record["sun_elevation"], &record["sun_azimuth"]), (&"+50".into(), &"150".into()));
     assert!(high - low >= 2.0 && low > 100.0, "{low} {high}");
     let size = [&record["width"], &record["height"]].map(|side| side.as_u64().unwrap() as usize);
-    let image = io::raster::ImageSource::open(folder.path().join("set/images/view_2.tif")).unwrap();
+    let image = formats::raster::ImageSource::open(folder.path().join("set/images/view_2.tif")).unwrap();
     assert_eq!(([image.info().width, image.info().height], image.info().bands), (size, 3));
     assert!(size[0] < 400 && size[1] < 400, "the image is not cut: {size:?}");
 
@@ -218,7 +218,7 @@ fn a_run_becomes_a_dataset_of_images_and_cameras() {
     let origin = [0, 1].map(|axis| set["images"][1]["origin_px"][axis].as_f64().unwrap());
     let camera = jobs::rpc::camera_of_run(&folder.path().join("run"), &views[1]).unwrap();
     for file in [cameras.join("view_2.json"), folder.path().join("set/images/view_2.tif")] {
-        let rpc = io::rpc::read(&file).unwrap().rpc;
+        let rpc = formats::rpc::read(&file).unwrap().rpc;
         for (sample, line) in [(5.0, 5.0), (60.0, 80.0)] {
             let ground = rpc.localize(camera::ImagePoint::new(sample, line), (low + high) / 2.0).unwrap();
             let at = camera.project(ground).unwrap();

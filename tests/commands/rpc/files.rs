@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use io::rpc::{RpcReadError, read};
+use formats::rpc::{RpcReadError, read};
 
 /// The fields of every line of the reference, by path.
 fn reference() -> BTreeMap<String, Vec<String>> {

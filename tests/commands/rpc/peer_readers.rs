@@ -8,8 +8,8 @@ use std::path::Path;
 use std::process::Command;
 
 use camera::{ImagePoint, Lens, LensModel, Pose};
-use io::colmap::{self, ColmapEncoding, ColmapModel, ColmapObservation, ColmapPoint, ColmapView};
-use io::ply::{self, PlyPoint};
+use formats::colmap::{self, ColmapEncoding, ColmapModel, ColmapObservation, ColmapPoint, ColmapView};
+use formats::ply::{self, PlyPoint};
 
 fn model() -> (ColmapModel, Vec<ColmapPoint>) {
     let lenses = vec![
@@ -52,10 +52,10 @@ fn dataset(folder: &Path) {
         std::fs::create_dir(folder.join(name)).unwrap();
     }
     let depth: Vec<f32> = (0..64 * 48).map(|n| if n % 3 == 0 { f32::INFINITY } else { n as f32 }).collect();
-    io::npy::write(folder.join("raw_depth/a.npy"), &[48, 64], &depth, false).unwrap();
-    io::npy::write(folder.join("raw_normal/a.npy"), &[48, 64, 3], &vec![0.5f32; 48 * 64 * 3], false).unwrap();
-    io::npy::write(folder.join("raw_mask/a.npy"), &[48, 64], &vec![true; 48 * 64], false).unwrap();
-    io::npy::write(folder.join("raw_mask/ids.npy"), &[48, 64], &vec![7u32; 48 * 64], false).unwrap();
+    formats::npy::write(folder.join("raw_depth/a.npy"), &[48, 64], &depth, false).unwrap();
+    formats::npy::write(folder.join("raw_normal/a.npy"), &[48, 64, 3], &vec![0.5f32; 48 * 64 * 3], false).unwrap();
+    formats::npy::write(folder.join("raw_mask/a.npy"), &[48, 64], &vec![true; 48 * 64], false).unwrap();
+    formats::npy::write(folder.join("raw_mask/ids.npy"), &[48, 64], &vec![7u32; 48 * 64], false).unwrap();
 }
 
 #[test]

@@ -41,7 +41,7 @@ fn projection_agrees_with_rpcm_on_every_file() {
     let reference = reference();
     assert!(reference.len() > 50);
     for (path, points) in reference {
-        let rpc = io::rpc::read(&root.join(&path)).unwrap_or_else(|e| panic!("{path}: {e}")).rpc;
+        let rpc = formats::rpc::read(&root.join(&path)).unwrap_or_else(|e| panic!("{path}: {e}")).rpc;
         for (ground, expected) in points {
             let found = rpc.project(ground).unwrap_or_else(|e| panic!("{path}: {e}"));
             let off = distance(found, expected);
@@ -68,7 +68,7 @@ fn localisation_inverts_projection_over_every_validity_cube() {
     let Some(root) = testing::shared_data("") else { return };
     let files = ["rpc", "stereo"].into_iter().flat_map(|folder| files_below(&root.join(folder)));
     let mut readable = 0;
-    for (path, file) in files.filter_map(|path| io::rpc::read(&path).ok().map(|file| (path, file))) {
+    for (path, file) in files.filter_map(|path| formats::rpc::read(&path).ok().map(|file| (path, file))) {
         readable += 1;
         let (rpc, path) = (file.rpc, path.display());
         let ground: Vec<_> = cube(&rpc).collect();

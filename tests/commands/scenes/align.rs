@@ -4,8 +4,8 @@
 use std::path::{Path, PathBuf};
 
 use crate::common::skysweep;
-use io::colmap::{ColmapPoint, read_with_points};
-use io::splat_ply::LocalOrigin;
+use formats::colmap::{ColmapPoint, read_with_points};
+use formats::splat_ply::LocalOrigin;
 use predicates::prelude::*;
 use serde_json::Value;
 
@@ -45,7 +45,7 @@ fn the_planted_similarity_comes_back_among_wrong_positions() {
         let origin: LocalOrigin = serde_json::from_value(json(out.join("origin.json"))).unwrap();
         assert_eq!((origin.crs.as_str(), origin.vertical.as_str()), ("EPSG:32631", "ellipsoid"));
         let (after, moved) = read_with_points(&out).unwrap();
-        let similarity = io::similarity::read(out.join("similarity.json")).unwrap();
+        let similarity = formats::similarity::read(out.join("similarity.json")).unwrap();
         assert!((similarity.scale() / 13.75 - 1.0).abs() < 1e-9);
         let close = |model: [f64; 3], local: [f64; 3]| {
             let expected = planted(model);
@@ -60,7 +60,7 @@ fn the_planted_similarity_comes_back_among_wrong_positions() {
         );
         assert!(points.iter().zip(&moved).all(|(b, a)| close(b.position, a.position) && b.track == a.track));
         // Every point stays where its image sees it.
-        let seen = |points: &[ColmapPoint], views: &[io::colmap::ColmapView]| -> Vec<[f64; 2]> {
+        let seen = |points: &[ColmapPoint], views: &[formats::colmap::ColmapView]| -> Vec<[f64; 2]> {
             let of = |point: &ColmapPoint| {
                 let [x, y, z] = views[point.track[0].view as usize].pose.camera_from_world(point.position);
                 [x / z, y / z]
@@ -101,7 +101,7 @@ fn noise_is_measured_and_its_models_are_written() {
     let (clean, _) = read_with_points(&out).unwrap();
     let distance = |name: &str| {
         let (model, _) = read_with_points(&noisy.join(name)).unwrap();
-        let square = |(a, b): (&io::colmap::ColmapView, &io::colmap::ColmapView)| {
+        let square = |(a, b): (&formats::colmap::ColmapView, &formats::colmap::ColmapView)| {
             (0..3).map(|i| (a.pose.centre[i] - b.pose.centre[i]).powi(2)).sum::<f64>()
         };
         (model.views.iter().zip(&clean.views).map(square).sum::<f64>() / 40.0).sqrt()

@@ -4,10 +4,10 @@
 use std::path::Path;
 
 use crate::common::skysweep;
+use formats::npy::{self, NpyArray, NpyData};
+use formats::raster::ImageSource;
+use formats::splat_ply::{SplatFile, SplatForm, SplatLayout};
 use gaussian::{Splat, SplatHarmonics};
-use io::npy::{self, NpyArray, NpyData};
-use io::raster::ImageSource;
-use io::splat_ply::{SplatFile, SplatForm, SplatLayout};
 use train::{Drawing, LearnedHarmonics, PinholeView, Registers, Surfel};
 
 /// Written by `generate.py` beside it, which has the shape of the splats, too.
@@ -132,7 +132,7 @@ fn a_garden_with_unit_harmonics_is_drawn_as_the_formulas_say() {
     let layout = SplatLayout { form: SplatForm::Discs, sh_degree: 3 };
     let ply = folder.path().join("garden.ply");
     let file = SplatFile { splats, harmonics: Some(unit), labels: None, layout, origin: None };
-    io::splat_ply::write_file(&ply, &file, false).unwrap();
+    formats::splat_ply::write_file(&ply, &file, false).unwrap();
     write_model(&folder.path().join("model"), &cameras);
     let mut command = skysweep();
     command.args(["splats", "render", "--progress", "none"]).arg(&ply).arg("--cameras");

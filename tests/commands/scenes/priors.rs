@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
 use camera::{Lens, LensModel, Pose};
-use io::colmap::{self, ColmapEncoding, ColmapModel, ColmapPoint, ColmapView};
-use io::npy::NpyData;
+use formats::colmap::{self, ColmapEncoding, ColmapModel, ColmapPoint, ColmapView};
+use formats::npy::NpyData;
 use serde_json::Value;
 
 /// A house of 8 × 6 m with a ridge, in EPSG:25832.
@@ -91,7 +91,7 @@ fn ring(count: u32) -> ColmapModel {
 }
 
 fn floats(path: &Path) -> (Vec<usize>, Vec<f32>) {
-    let array = io::npy::read(path).unwrap();
+    let array = formats::npy::read(path).unwrap();
     let NpyData::F32(data) = array.data else { panic!("{path:?} is not f32") };
     (array.shape, data)
 }
@@ -127,7 +127,7 @@ fn a_whole_dataset() {
         let (shape, depth) = floats(&bench.path(&format!("out/raw_depth/view_{view}.npy")));
         let (normal_shape, normal) = floats(&bench.path(&format!("out/raw_normal/view_{view}.npy")));
         assert_eq!((shape, normal_shape), (vec![SIZE[1], SIZE[0]], vec![SIZE[1], SIZE[0], 3]));
-        let mask = io::npy::read(bench.path(&format!("out/raw_mask/view_{view}.npy"))).unwrap();
+        let mask = formats::npy::read(bench.path(&format!("out/raw_mask/view_{view}.npy"))).unwrap();
         let NpyData::Bool(mask) = mask.data else { panic!("no bools") };
         let pose = text.views[view - 1].pose;
         for (i, (&z, n)) in depth.iter().zip(normal.chunks_exact(3)).enumerate() {
@@ -387,7 +387,7 @@ fn pictures_are_masked_for_buildings_alone_and_copied_otherwise() {
     bench.run(&[&OFFSET[..], &alone].concat()).code(0);
     let masked = image::open(bench.path("alone/images/view_2.png")).unwrap();
     let masked = masked.as_rgba8().expect("red, green, blue and alpha");
-    let mask = io::npy::read(bench.path("alone/raw_mask/view_2.npy")).unwrap();
+    let mask = formats::npy::read(bench.path("alone/raw_mask/view_2.npy")).unwrap();
     let NpyData::Bool(mask) = mask.data else { panic!("a mask of truth values") };
     assert!(mask.iter().any(|m| *m) && mask.iter().any(|m| !*m));
     for ((x, y, pixel), shown) in masked.enumerate_pixels().zip(mask) {
@@ -472,7 +472,7 @@ fn lost_objects_are_told_by_the_exit_code() {
 #[test]
 fn the_enhanced_mode_keeps_the_points_of_the_scene() {
     let bench = Bench::new();
-    let seen = io::colmap::ColmapObservation { view: 1, pixel: camera::ImagePoint { sample: 10.0, line: 11.0 } };
+    let seen = formats::colmap::ColmapObservation { view: 1, pixel: camera::ImagePoint { sample: 10.0, line: 11.0 } };
     let tree = ColmapPoint { position: [9.0, 1.0, 2.0], color: [1, 200, 3], error_px: 0.4, track: vec![seen] };
     bench.write_cameras(&ring(4), std::slice::from_ref(&tree));
     bench.run(&[&OFFSET[..], &["-o", "only"]].concat()).code(0);

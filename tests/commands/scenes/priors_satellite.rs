@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
-use io::raster::ImageSource;
+use formats::raster::ImageSource;
 use raster::Grid;
 use serde_json::Value;
 
@@ -56,7 +56,7 @@ fn heights_are_those_that_the_simulator_saw() {
         assert!(row["line_of_sight_error_m"].as_f64().unwrap() < 2e-3, "{row}");
         let out = |kind: &str| folder.path().join(format!("out/{kind}/heights_{}.tif", number + 1));
         // The maps say where they are as the image does.
-        let rpc = |path: &Path| io::rpc::read_for_image(path).unwrap().rpc;
+        let rpc = |path: &Path| formats::rpc::read_for_image(path).unwrap().rpc;
         assert_eq!(rpc(&out("height")), rpc(&folder.path().join(images[number])));
         let (found, truth) = (band(out("height"), 1), band(folder.path().join(images[number]), 1));
         let (up, mask) = (band(out("normal"), 3), band(out("mask"), 1));

@@ -8,7 +8,7 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use city::{CityModel, MeshConfig, ModelPoint, SurfaceClass, TriangleMesh};
-use io::colmap::{self, ColmapModel};
+use formats::colmap::{self, ColmapModel};
 use priors::{
     Amount, MapConfig, PriorMaps, PriorModel, Rays, Sample, SampleConfig, Spacing, View, Visibility, VisibilityConfig,
     sample,

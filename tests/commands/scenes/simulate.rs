@@ -110,7 +110,7 @@ fn the_buildings_come_as_a_city_model_of_level_2() {
 
 /// A raster's cells, which do not depend on the version of GDAL that compressed them.
 fn cells(path: &Path) -> Vec<f32> {
-    io::raster::read_dem(path).unwrap().heights.into_vec()
+    formats::raster::read_dem(path).unwrap().heights.into_vec()
 }
 
 #[test]
@@ -225,7 +225,7 @@ fn a_flight_sees_the_buildings_and_its_points_lie_on_them() {
     let folder = tempfile::tempdir().unwrap();
     let flight = ["--flight", "5", "--flight-arc", "120", "240", "-o"];
     skysweep().args(SMALL).args(flight).arg(folder.path()).assert().code(0);
-    let (model, points) = io::colmap::read_with_points(&folder.path().join("cameras/sparse/0")).unwrap();
+    let (model, points) = formats::colmap::read_with_points(&folder.path().join("cameras/sparse/0")).unwrap();
     assert_eq!((model.views.len(), model.views[4].name.as_str()), (5, "flight_05.png"));
     let record = json(&folder.path().join("scene.json"));
     let middle = [0, 1].map(|i| record["origin_m"][i].as_f64().unwrap());
@@ -235,7 +235,8 @@ fn a_flight_sees_the_buildings_and_its_points_lie_on_them() {
         // The middle of the scene, at its ground, is near the middle of every image.
         assert!(z > 30.0 && (x / z).abs() < 0.1 && (y / z).abs() < 0.2, "{:?}", [x / z, y / z, z]);
         assert!(view.pose.centre[1] < middle[1], "the arc is in the south");
-        let picture = io::raster::ImageSource::open(folder.path().join("cameras/images").join(&view.name)).unwrap();
+        let picture =
+            formats::raster::ImageSource::open(folder.path().join("cameras/images").join(&view.name)).unwrap();
         let pixels = picture.read_colour(picture.window()).unwrap();
         assert_eq!((pixels.width(), pixels.height()), (640, 480));
         let values: Vec<f32> = pixels.data().iter().map(|p| p[0]).collect();

@@ -4,14 +4,14 @@
 use std::path::Path;
 
 use assert_cmd::Command;
-use io::npy::NpyData;
+use formats::npy::NpyData;
 use serde_json::Value;
 
 use super::priors::{Bench, OFFSET, SIZE};
 
 /// Returns the numbers of a map of classes or objects.
 fn numbers(path: &Path) -> Vec<u32> {
-    match io::npy::read(path).unwrap().data {
+    match formats::npy::read(path).unwrap().data {
         NpyData::U8(values) => values.into_iter().map(u32::from).collect(),
         NpyData::U32(values) => values,
         other => panic!("{path:?} is {other:?}"),
@@ -26,7 +26,7 @@ fn splats_carry_class_and_object_to_maps() {
     let more = ["-o", "out", "--extras", "--min-views", "1", "--class-weight", "GroundSurface=0"];
     bench.run(&[&OFFSET[..], &more].concat()).code(0);
     let path = bench.path("out/splats/splats_2dgs.ply");
-    let made = io::splat_files::read(&path).unwrap();
+    let made = formats::splat_files::read(&path).unwrap();
     let labels = made.labels.clone().unwrap();
     assert!(labels.of.iter().all(|label| label.object == 1 && [2, 3].contains(&label.class)));
     let house = &labels.table.objects[0];
@@ -42,18 +42,21 @@ fn splats_carry_class_and_object_to_maps() {
     }
     let far = gaussian::Splat { position: [-8.0, -8.0, 0.5], ..splats[0] };
     splats.push(far);
-    let origin = Some(io::splat_ply::LocalOrigin::new("EPSG:25832", "ellipsoid", [500_004.0, 5_700_003.0, 30.0]));
-    for (name, form) in [("2d", io::splat_ply::SplatForm::Discs), ("3d", io::splat_ply::SplatForm::Ellipsoids)] {
-        let layout = io::splat_ply::SplatLayout { form, sh_degree: 0 };
+    let origin = Some(formats::splat_ply::LocalOrigin::new("EPSG:25832", "ellipsoid", [500_004.0, 5_700_003.0, 30.0]));
+    for (name, form) in
+        [("2d", formats::splat_ply::SplatForm::Discs), ("3d", formats::splat_ply::SplatForm::Ellipsoids)]
+    {
+        let layout = formats::splat_ply::SplatLayout { form, sh_degree: 0 };
         // Ellipsoids as thick as a tenth of their width are no discs.
         let thick = |splat: &gaussian::Splat| {
             let [u, v, _] = splat.scale_m;
             gaussian::Splat { scale_m: [u, v, 0.1 * u], ..*splat }
         };
         let splats = splats.iter().map(thick).collect();
-        let file = io::splat_ply::SplatFile { splats, harmonics: None, labels: None, layout, origin: origin.clone() };
+        let file =
+            formats::splat_ply::SplatFile { splats, harmonics: None, labels: None, layout, origin: origin.clone() };
         let (bare, labelled) = (format!("{name}.ply"), format!("{name}_labelled.ply"));
-        io::splat_files::write(&bench.path(&bare), &file, false).unwrap();
+        formats::splat_files::write(&bench.path(&bare), &file, false).unwrap();
         let skysweep = |arguments: &[&str]| {
             let mut command = Command::cargo_bin("skysweep").unwrap();
             command.current_dir(bench.folder.path()).arg("splats").args(arguments).assert()
@@ -61,7 +64,7 @@ fn splats_carry_class_and_object_to_maps() {
         let told = skysweep(&["label", &bare, "--city", "house.city.json", "-o", &labelled, "--json"]).code(0);
         let report: Value = serde_json::from_slice(&told.get_output().stdout).unwrap();
         assert_eq!((&report["objects"], &report["objects_of_model"]), (&1.into(), &1.into()));
-        let found = io::splat_files::read(&bench.path(&labelled)).unwrap().labels.unwrap();
+        let found = formats::splat_files::read(&bench.path(&labelled)).unwrap().labels.unwrap();
         assert!(found.of.last().is_some_and(|label| label.is_none()));
         let right = found.of.iter().zip(&labels.of).filter(|(a, b)| a == b).count();
         assert!(right as f64 > 0.97 * labels.of.len() as f64, "{name}: {right} of {}", labels.of.len());
@@ -92,16 +95,16 @@ fn splats_carry_class_and_object_to_maps() {
         let sog = format!("{name}_packed.sog");
         let told = skysweep(&["convert", &labelled, &sog]).code(0);
         assert!(String::from_utf8_lossy(&told.get_output().stdout).contains("are left out: only PLY holds them"));
-        assert_eq!(io::splat_files::read(&bench.path(&sog)).unwrap().labels, None);
+        assert_eq!(formats::splat_files::read(&bench.path(&sog)).unwrap().labels, None);
         let copy = format!("{name}_copy.ply");
         skysweep(&["convert", &labelled, &copy, "-q"]).code(0);
-        assert_eq!(io::splat_files::read(&bench.path(&copy)).unwrap().labels.unwrap(), found);
+        assert_eq!(formats::splat_files::read(&bench.path(&copy)).unwrap().labels.unwrap(), found);
         let refused = skysweep(&["label", &bare, "--city", "house.city.json", "-o", &format!("{name}_2.spz")]).code(2);
         assert!(String::from_utf8_lossy(&refused.get_output().stderr).contains(".ply, which alone holds classes"));
     }
     // Without a map, the similarity says where the model is.
-    let file = io::splat_ply::SplatFile { origin: None, labels: None, ..made.clone() };
-    io::splat_files::write(&bench.path("free.ply"), &file, false).unwrap();
+    let file = formats::splat_ply::SplatFile { origin: None, labels: None, ..made.clone() };
+    formats::splat_files::write(&bench.path("free.ply"), &file, false).unwrap();
     let mut arguments = vec!["splats", "label", "free.ply", "--city", "house.city.json", "-o", "free_labelled.ply"];
     let run = |arguments: &[&str]| {
         Command::cargo_bin("skysweep").unwrap().current_dir(bench.folder.path()).args(arguments).assert()
@@ -111,7 +114,7 @@ fn splats_carry_class_and_object_to_maps() {
     std::fs::write(bench.path("similarity.json"), r#"{"translation": [-500004.0, -5700003.0, -30.0]}"#).unwrap();
     arguments.extend(["--transform", "similarity.json", "-q"]);
     run(&arguments).code(0);
-    let found = io::splat_files::read(&bench.path("free_labelled.ply")).unwrap().labels.unwrap();
+    let found = formats::splat_files::read(&bench.path("free_labelled.ply")).unwrap().labels.unwrap();
     let right = found.of.iter().zip(&labels.of).filter(|(a, b)| a == b).count();
     assert!(right as f64 > 0.99 * labels.of.len() as f64, "{right} of {}", labels.of.len());
 }

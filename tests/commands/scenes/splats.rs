@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use crate::common::{json, sample, simulated, skysweep};
-use io::raster::{ImageSource, read_dem};
-use io::splat_ply::LocalOrigin;
+use formats::raster::{ImageSource, read_dem};
+use formats::splat_ply::LocalOrigin;
 use predicates::prelude::*;
 use serde_json::Value;
 
@@ -26,7 +26,7 @@ fn psnr_by_truth(scene: &Path, rendering: &Path, range: &Value, view: &str) -> (
     let rendered = ImageSource::open(rendering).unwrap();
     let rendered = rendered.read_colour(rendered.window()).unwrap();
     let truth = scene.join("truth").join(view.replace("view", "heights") + ".tif");
-    let rpc = io::rpc::read_for_image(&truth).unwrap().rpc;
+    let rpc = formats::rpc::read_for_image(&truth).unwrap().rpc;
     let source = ImageSource::open(&truth).unwrap();
     let heights = source.read_luma(source.window()).unwrap().luma;
     let dsm = read_dem(scene.join("truth/dsm.tif")).unwrap();
@@ -175,8 +175,8 @@ fn discs_uniform_splats_and_threads() {
     };
     let bytes = |path: PathBuf| std::fs::read(path).unwrap();
     assert!(bytes(run("a.ply", "1", &[])) == bytes(run("b.ply", "3", &[])), "threads change the splats");
-    let discs = io::splat_ply::read(&run("c.ply", "2", &["--form", "2d", "--uniform", "4"])).unwrap();
-    assert_eq!((discs.layout.form, discs.splats.len()), (io::splat_ply::SplatForm::Discs, 60 * 60));
+    let discs = formats::splat_ply::read(&run("c.ply", "2", &["--form", "2d", "--uniform", "4"])).unwrap();
+    assert_eq!((discs.layout.form, discs.splats.len()), (formats::splat_ply::SplatForm::Discs, 60 * 60));
     // Squares of 4 cells of half a metre: one metre of standard deviation where the ground is
     // level.
     assert!(discs.splats.iter().all(|s| s.scale_m[0] >= 0.999 && s.scale_m[1] >= 0.999));
@@ -213,7 +213,7 @@ fn pointing_comes_from_the_run_that_made_the_surface() {
     };
     let (with, without) = (rendered(&[]), rendered(&["--corrections", "none"]));
     assert!(with > without + 0.5, "{with:.2} dB rendered with the corrections, {without:.2} dB without");
-    let opacities: Vec<f32> = io::splat_ply::read(&ply).unwrap().splats.iter().map(|s| s.opacity).collect();
+    let opacities: Vec<f32> = formats::splat_ply::read(&ply).unwrap().splats.iter().map(|s| s.opacity).collect();
     let confidence = read_dem(out.join("dsm/confidence.tif")).unwrap().heights;
     let surest = confidence.data().iter().copied().filter(|c| c.is_finite()).fold(0.0, f32::max);
     let most = opacities.iter().copied().fold(0.0, f32::max);
@@ -256,8 +256,8 @@ fn splats_are_seen_again_through_images_and_perspective_cameras() {
     let model = ground.join("sparse/0");
     let (report, out) = render("cameras", &["--cameras".as_ref(), model.as_os_str()]);
     assert!(report["views"][2]["psnr_db"].is_null() && report["views"][2]["coverage"].as_f64().unwrap() > 0.1);
-    let array = |path: PathBuf| io::npy::read(path).unwrap().data.to_f64();
-    let cameras = io::colmap::read(&model).unwrap();
+    let array = |path: PathBuf| formats::npy::read(path).unwrap().data.to_f64();
+    let cameras = formats::colmap::read(&model).unwrap();
     let origin: LocalOrigin = serde_json::from_slice(&std::fs::read(model.join("origin.json")).unwrap()).unwrap();
     let mut off: Vec<f64> = Vec::new();
     for view in &cameras.views {
@@ -369,13 +369,13 @@ fn colours_that_a_format_cannot_hold_are_counted() {
         opacity: 0.5,
     };
     let splats = vec![splat, gaussian::Splat { colour: [0.2, -0.6, 1.0], ..splat }];
-    let layout = io::splat_ply::SplatLayout::default();
-    let file = io::splat_ply::SplatFile { splats, harmonics: None, labels: None, layout, origin: None };
-    io::splat_files::write(&bright, &file, false).unwrap();
+    let layout = formats::splat_ply::SplatLayout::default();
+    let file = formats::splat_ply::SplatFile { splats, harmonics: None, labels: None, layout, origin: None };
+    formats::splat_files::write(&bright, &file, false).unwrap();
     let mut command = skysweep();
     command.args(["splats", "convert", "--json"]).arg(&bright).arg(&spz);
     assert_eq!(json(command.output().unwrap())["clipped"], 1);
-    let back = io::splat_files::read(&spz).unwrap().splats;
+    let back = formats::splat_files::read(&spz).unwrap().splats;
     assert!((back[1].colour[1] + 0.44).abs() < 0.01 && (back[0].colour[2] - 1.4).abs() < 0.004, "{back:?}");
     assert!(!spz.with_extension("origin.json").exists());
 }

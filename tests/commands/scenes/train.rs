@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use crate::common::{sample, simulated, skysweep};
 use crs::Crs;
-use io::raster::{Band, BandData, CogRaster, read_dem, write_cog, write_png_gray, write_png_rgb};
+use formats::raster::{Band, BandData, CogRaster, read_dem, write_cog, write_png_gray, write_png_rgb};
 use jobs::train::{SatelliteTrainConfig, TrainConfig, run, run_on_images};
 use numeric::{Choice, Failure, Kind, Progress, Silent, upper_median};
 use predicates::prelude::*;
@@ -35,8 +35,8 @@ fn dataset() -> &'static Path {
 }
 
 fn draw_images(folder: &Path) {
-    let (model, points) = io::colmap::read_with_points(&folder.join("sparse/0")).unwrap();
-    let surfel = |p: &io::colmap::ColmapPoint| {
+    let (model, points) = formats::colmap::read_with_points(&folder.join("sparse/0")).unwrap();
+    let surfel = |p: &formats::colmap::ColmapPoint| {
         let [x, y, z] = p.position;
         let tone =
             |k: f64| (0.5 + 0.35 * ((0.2 + 0.05 * k) * x + 0.1 * y).sin() * (0.15 * y + 0.3 * z + k).cos()) as f32;
@@ -105,7 +105,7 @@ fn views_that_were_not_trained_on_become_better() {
         let [before, after] = ["psnr_before_db", "psnr_db"].map(|key| view[key].as_f64().unwrap());
         assert!(after > before + 1.0, "{view}");
     }
-    let splats = io::splat_ply::read(&out.path().join("a/splats.ply")).unwrap();
+    let splats = formats::splat_ply::read(&out.path().join("a/splats.ply")).unwrap();
     assert_eq!(splats.splats.len() as u64, report["splats_after"].as_u64().unwrap());
     assert!(splats.splats.len() <= 8000 && !out.path().join("a/checkpoint.bin").exists());
     assert_eq!(std::fs::read_dir(out.path().join("a/renders")).unwrap().count(), 3);
@@ -168,7 +168,7 @@ fn masked_pixels_take_no_part() {
         let folder = out.path().join(folder);
         std::fs::create_dir_all(&folder).unwrap();
         for name in &names {
-            let source = io::raster::ImageSource::open(dataset().join("images").join(name)).unwrap();
+            let source = formats::raster::ImageSource::open(dataset().join("images").join(name)).unwrap();
             let mut picture = source.read_colour(source.window()).unwrap().map(|p| p.map(|c| c as u8));
             let (width, third) = (picture.width(), picture.width() / 3);
             for (pixel, value) in picture.data_mut().iter_mut().enumerate() {
@@ -210,7 +210,7 @@ fn masked_pixels_take_no_part() {
     refused("flight_03.png has no mask, expected flight_03.png.png or flight_03.png in");
     write_png_gray(&path, &Grid::filled(7, 5, 255), true).unwrap();
     refused("the mask has [7, 5] columns and rows, its camera");
-    let size = io::colmap::read(&dataset().join("sparse/0")).unwrap().lenses[0].clone();
+    let size = formats::colmap::read(&dataset().join("sparse/0")).unwrap().lenses[0].clone();
     write_png_gray(&path, &Grid::filled(size.width(), size.height(), 0), true).unwrap();
     refused("the mask of flight_03.png is 0 everywhere");
 }
@@ -231,7 +231,7 @@ fn held_out_photographs_are_not_learned_from() {
         std::fs::read(output.join("splats.ply")).unwrap()
     };
     let first = splats("first");
-    let size = io::colmap::read(&dataset().join("sparse/0")).unwrap().lenses[0].clone();
+    let size = formats::colmap::read(&dataset().join("sparse/0")).unwrap().lenses[0].clone();
     let black = Grid::filled(size.width(), size.height(), [0u8; 3]);
     write_png_rgb(pictures.join("flight_04.png"), &black, true).unwrap();
     assert!(splats("second") == first, "the splats depend on a photograph that is held out");
@@ -242,9 +242,9 @@ fn held_out_photographs_are_not_learned_from() {
 fn transforms_are_trained_on() {
     let out = tempfile::tempdir().unwrap();
     let root = out.path().join("scene");
-    let model = io::colmap::read(&dataset().join("sparse/0")).unwrap();
+    let model = formats::colmap::read(&dataset().join("sparse/0")).unwrap();
     std::fs::create_dir_all(root.join("images")).unwrap();
-    let frame = |view: &io::colmap::ColmapView| {
+    let frame = |view: &formats::colmap::ColmapView| {
         std::fs::copy(dataset().join("images").join(&view.name), root.join("images").join(&view.name)).unwrap();
         let (lens, r, c) = (&model.lenses[view.lens], view.pose.rotation, view.pose.centre);
         let ([fx, fy], at) = (lens.focal_px(), lens.principal_point());
@@ -280,7 +280,7 @@ fn transforms_are_trained_on() {
 fn models_and_images_are_found_where_they_lie() {
     let out = tempfile::tempdir().unwrap();
     let root = out.path().join("scene");
-    let (mut model, points) = io::colmap::read_with_points(&dataset().join("sparse/0")).unwrap();
+    let (mut model, points) = formats::colmap::read_with_points(&dataset().join("sparse/0")).unwrap();
     for (number, view) in model.views.iter_mut().enumerate() {
         let name = format!("camera_{}/{}", number % 2, view.name);
         std::fs::create_dir_all(root.join("dense/pictures").join(&name).parent().unwrap()).unwrap();
@@ -289,7 +289,7 @@ fn models_and_images_are_found_where_they_lie() {
     }
     let sparse = root.join("dense/colmap/sparse/3");
     std::fs::create_dir_all(&sparse).unwrap();
-    io::colmap::write(&sparse, &model, &points, io::colmap::ColmapEncoding::Text, false).unwrap();
+    formats::colmap::write(&sparse, &model, &points, formats::colmap::ColmapEncoding::Text, false).unwrap();
     let folder = out.path().join("a");
     let mut command = skysweep();
     command.arg("train").arg(&root).arg("-o").arg(&folder).args(["--shrink", "8", "--iterations", "5"]);
@@ -532,7 +532,7 @@ fn heights_of_unknown_scale_give_splats_their_form() {
             command.arg("--relative-heights").arg(path);
         }
         command.assert().success();
-        let file = io::splat_ply::read(&out.path().join(name).join("splats.ply")).unwrap();
+        let file = formats::splat_ply::read(&out.path().join(name).join("splats.ply")).unwrap();
         let origin = file.origin.unwrap().origin;
         // Splats that lie on flat places.
         let level = file.splats.iter().filter(|splat| splat.normal()[2].abs() > 0.9);
@@ -587,7 +587,7 @@ fn photographs_of_a_castle_are_learned_and_rendered_alike() {
     command.arg(&folder).assert().success();
     let report = report_of(&folder);
     assert_eq!((&report["preset"], report["harmonics_degree"].as_u64()), (&"photographs".into(), Some(3)));
-    let file = io::splat_files::read(&folder.join("splats.ply")).unwrap();
+    let file = formats::splat_files::read(&folder.join("splats.ply")).unwrap();
     let harmonics = file.harmonics.expect("colours that depend on the direction");
     let largest = |splat| harmonics.of(splat, 0).iter().fold(0.0f32, |most, c| most.max(c.abs()));
     let coloured = (0..file.splats.len()).filter(|&splat| largest(splat) > 0.01).count();

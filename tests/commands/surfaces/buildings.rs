@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::common::{band, skysweep};
-use io::raster::{ImageSource, read_dem};
+use formats::raster::{ImageSource, read_dem};
 use predicates::prelude::*;
 use serde_json::Value;
 

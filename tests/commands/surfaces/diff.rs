@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::common::{band, skysweep, write_like};
-use io::raster::{BandData, read_dem};
+use formats::raster::{BandData, read_dem};
 use predicates::prelude::*;
 use raster::Grid;
 use serde_json::Value;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crate::common::{band, skysweep, write_like};
 use crs::VerticalDatum;
-use io::raster::{BandData, read_dem};
+use formats::raster::{BandData, read_dem};
 use numeric::random::{hash64, unit_interval};
 use predicates::prelude::*;
 use raster::Grid;

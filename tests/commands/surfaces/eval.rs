@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
 use crs::{Crs, HeightConverter, MapProjection, VerticalDatum};
-use io::raster::{Band, BandData, CogRaster, read_dem, write_cog};
+use formats::raster::{Band, BandData, CogRaster, read_dem, write_cog};
 use predicates::prelude::PredicateBooleanExt;
 use predicates::str::contains;
 use raster::{GeoTransform, Grid};

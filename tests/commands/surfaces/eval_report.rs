@@ -7,7 +7,7 @@ use std::process::Output;
 
 use assert_cmd::Command;
 use crs::Crs;
-use io::raster::{Band, BandData, CogRaster, read_dem, write_cog};
+use formats::raster::{Band, BandData, CogRaster, read_dem, write_cog};
 use predicates::prelude::PredicateBooleanExt;
 use predicates::str::contains;
 use raster::{GeoTransform, Grid};

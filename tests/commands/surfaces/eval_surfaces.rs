@@ -189,26 +189,26 @@ fn what_cannot_be_compared_is_refused() {
 fn maps_of_depths_normals_and_masks() {
     let folder = TempDir::new().unwrap();
     let at = |name: &str| folder.path().join(name);
-    io::npy::write(at("a.npy"), &[2, 2], &[1.0f32, 2.0, f32::INFINITY, 4.0], false).unwrap();
-    io::npy::write(at("b.npy"), &[2, 2], &[1.5f32, 2.0, 3.0, 0.0], false).unwrap();
+    formats::npy::write(at("a.npy"), &[2, 2], &[1.0f32, 2.0, f32::INFINITY, 4.0], false).unwrap();
+    formats::npy::write(at("b.npy"), &[2, 2], &[1.5f32, 2.0, 3.0, 0.0], false).unwrap();
     let found = json(&[], &at("a.npy"), &at("b.npy"));
     assert_eq!((&found["kind"], &found["result"]["valid"]["both"]), (&"depth".into(), &2.into()));
     near(&found["result"]["errors"]["mae"], 0.25, 1e-12);
     skysweep(&["--max-mae", "0.2"], &at("a.npy"), &at("b.npy")).code(1);
     skysweep(&[], &at("a.npy"), &at("b.npy")).success().stdout(contains("errors.mae"));
     let normals: Vec<f32> = [[0.0, 0.0, 1.0], [0.0, 1.0, 0.0]].concat();
-    io::npy::write(at("n.npy"), &[1, 2, 3], &normals, false).unwrap();
-    io::npy::write(at("m.npy"), &[1, 2, 3], &[0.0f32, 0.0, 1.0, 0.0, 0.0, 1.0], false).unwrap();
+    formats::npy::write(at("n.npy"), &[1, 2, 3], &normals, false).unwrap();
+    formats::npy::write(at("m.npy"), &[1, 2, 3], &[0.0f32, 0.0, 1.0, 0.0, 0.0, 1.0], false).unwrap();
     near(&json(&[], &at("n.npy"), &at("m.npy"))["result"]["angles"]["mean_deg"], 45.0, 1e-9);
-    io::npy::write(at("p.npy"), &[1, 3], &[true, true, false], false).unwrap();
-    io::npy::write(at("q.npy"), &[1, 3], &[true, false, false], false).unwrap();
+    formats::npy::write(at("p.npy"), &[1, 3], &[true, true, false], false).unwrap();
+    formats::npy::write(at("q.npy"), &[1, 3], &[true, false, false], false).unwrap();
     near(&json(&[], &at("p.npy"), &at("q.npy"))["result"]["set"]["iou"], 0.5, 1e-12);
     skysweep(&[], &at("a.npy"), &at("n.npy")).code(2).stderr(contains("maps of one camera"));
     skysweep(&["-o", "x"], &at("a.npy"), &at("b.npy")).code(2).stderr(contains("leave -o out"));
     // A raster is a map where it is said to be one.
     let grid = raster::Grid::from_vec(2, 2, vec![1.0f32, 2.5, f32::NAN, 4.0]).unwrap();
-    let band = [io::raster::Band { description: "depth_m", data: io::raster::BandData::F32(&grid) }];
-    io::raster::write_map(at("c.tif"), &band, Some(-32768.0), &[], false).unwrap();
+    let band = [formats::raster::Band { description: "depth_m", data: formats::raster::BandData::F32(&grid) }];
+    formats::raster::write_map(at("c.tif"), &band, Some(-32768.0), &[], false).unwrap();
     let found = json(&["--maps", "depth"], &at("c.tif"), &at("a.npy"));
     near(&found["result"]["errors"]["max_abs"], 0.5, 1e-12);
 }

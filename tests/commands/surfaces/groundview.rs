@@ -7,9 +7,9 @@ use crate::common::skysweep;
 use bvh::{Bvh, Ray};
 use camera::ImagePoint;
 use crs::MapProjection;
-use io::colmap::read_with_points;
-use io::raster::{Dem, ImageSource, read_dem, write_png_rgb};
-use io::splat_ply::LocalOrigin;
+use formats::colmap::read_with_points;
+use formats::raster::{Dem, ImageSource, read_dem, write_png_rgb};
+use formats::splat_ply::LocalOrigin;
 use predicates::prelude::*;
 use raster::Grid;
 use serde_json::Value;
@@ -54,7 +54,7 @@ fn origin(folder: &Path) -> LocalOrigin {
 }
 
 fn array(path: PathBuf) -> Vec<f64> {
-    io::npy::read(path).unwrap().data.to_f64()
+    formats::npy::read(path).unwrap().data.to_f64()
 }
 
 /// The triangles of a raster, two to each square of cells, made here anew; metres from the origin.

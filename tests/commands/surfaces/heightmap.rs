@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 
 use crate::common::skysweep;
 use crs::{Crs, MapProjection, VerticalDatum};
-use io::raster::{Band, BandData, CogRaster, Dem, ImageSource, read_dem, write_cog};
-use io::splat_ply::LocalOrigin;
+use formats::raster::{Band, BandData, CogRaster, Dem, ImageSource, read_dem, write_cog};
+use formats::splat_ply::LocalOrigin;
 use predicates::prelude::*;
 use raster::Grid;
 use serde_json::Value;
@@ -164,7 +164,7 @@ fn a_cloud_gives_the_highest_point_of_each_pixel() {
     let folder = tempfile::tempdir().unwrap();
     let cloud = folder.path().join("cloud.las");
     let points: Vec<[f64; 3]> = reference("point").iter().map(|p| [p[0], p[1], p[2]]).collect();
-    io::points::write_las(&cloud, &points, Crs::ellipsoidal(32631), false).unwrap();
+    formats::points::write_las(&cloud, &points, Crs::ellipsoidal(32631), false).unwrap();
     let path = map(&folder, &cloud, &["--heading", "-23", "--size", "24"]);
     let dem = read_dem(&path).unwrap();
     let rows = reference("cell");
@@ -324,7 +324,7 @@ fn unprojected_points_lie_on_the_surface() {
     let known = heights.data().iter().filter(|h| h.is_finite()).count();
     let dsm = read_dem(town("dsm.tif")).unwrap();
     let mut points = 0;
-    io::points::PointCloud::open(&cloud)
+    formats::points::PointCloud::open(&cloud)
         .unwrap()
         .visit(|p| {
             let (c, r) = dsm.geotransform.cell_from_map(p.x, p.y).unwrap();
@@ -351,7 +351,7 @@ fn unprojected_splats_lie_on_the_surface_in_the_pictures_colours() {
     let picture = folder.path().join("tile.png");
     let size = values(&path, 1).width();
     let pixels = Grid::from_vec(size, size, (0..size * size).map(|i| [(i % 251) as u8, 80, 0]).collect()).unwrap();
-    io::raster::write_png_rgb(&picture, &pixels, false).unwrap();
+    formats::raster::write_png_rgb(&picture, &pixels, false).unwrap();
     let unproject = |name: &str, options: &[&str]| {
         let ply = folder.path().join(name);
         let mut command = skysweep();
@@ -359,7 +359,7 @@ fn unprojected_splats_lie_on_the_surface_in_the_pictures_colours() {
         command.args(options).assert().code(0);
         let origin: LocalOrigin =
             serde_json::from_slice(&std::fs::read(ply.with_extension("origin.json")).unwrap()).unwrap();
-        (io::splat_ply::read(&ply).unwrap().splats, origin)
+        (formats::splat_ply::read(&ply).unwrap().splats, origin)
     };
     let (splats, origin) = unproject("splats.ply", &[]);
     let heights = values(&path, 1);
@@ -380,7 +380,7 @@ fn unprojected_splats_lie_on_the_surface_in_the_pictures_colours() {
     }
     assert!(splats.iter().any(|s| s.colour[0] > 0.9) && splats.iter().any(|s| s.colour[0] < 0.1));
     // Colours that change with every pixel keep theirs apart; grey ones go together.
-    io::raster::write_png_rgb(&picture, &Grid::filled(size, size, [128; 3]), true).unwrap();
+    formats::raster::write_png_rgb(&picture, &Grid::filled(size, size, [128; 3]), true).unwrap();
     let (merged, _) = unproject("merged.ply", &["--merge", "0.25"]);
     assert!(merged.len() * 4 < splats.len(), "{} of {}", merged.len(), splats.len());
     let mut command = skysweep();
@@ -453,7 +453,7 @@ fn lists_over_a_cloud_are_those_of_single_maps() {
     let folder = tempfile::tempdir().unwrap();
     let cloud = folder.path().join("cloud.laz");
     let points: Vec<[f64; 3]> = reference("point").iter().map(|p| [p[0], p[1], p[2]]).collect();
-    io::points::write_las(&cloud, &points, Crs::ellipsoidal(32631), false).unwrap();
+    formats::points::write_las(&cloud, &points, Crs::ellipsoidal(32631), false).unwrap();
     let (list, out) = (folder.path().join("cameras.csv"), folder.path().join("maps"));
     std::fs::write(&list, "lon,lat,heading\n5.4,43.53,-23\n5.40001,43.53001,10\n").unwrap();
     let mut command = skysweep();

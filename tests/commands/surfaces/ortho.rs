@@ -186,18 +186,18 @@ fn an_area_beside_the_surface_is_refused() {
 /// Three bands of a colour image are red, green and blue in the ortho too.
 #[test]
 fn colours_keep_their_names() {
-    use io::raster::{Band, BandData, LumaRule, write_image_with_rpc};
+    use formats::raster::{Band, BandData, LumaRule, write_image_with_rpc};
     let folder = tempfile::tempdir().unwrap();
-    let grey = io::raster::ImageSource::open(sample("view_1.tif")).unwrap();
+    let grey = formats::raster::ImageSource::open(sample("view_1.tif")).unwrap();
     let samples = grey.read_samples(1, grey.window()).unwrap().map(|v| *v as u16);
-    let rpc = io::rpc::read_for_image(&sample("view_1.tif")).unwrap().rpc;
+    let rpc = formats::rpc::read_for_image(&sample("view_1.tif")).unwrap().rpc;
     let bands = ["red", "green", "blue"].map(|description| Band { description, data: BandData::U16(&samples) });
     let (image, out) = (folder.path().join("colour.tif"), folder.path().join("ortho.tif"));
     write_image_with_rpc(&image, &bands, &rpc, Some(0.0), false).unwrap();
     let mut command = skysweep();
     command.arg("ortho").arg(&image).arg("--dsm").arg(sample("truth/dsm.tif")).arg("-o").arg(&out);
     command.args(["--gsd", "2", "--progress", "none", "-q"]).assert().code(0);
-    let written = io::raster::ImageSource::open(&out).unwrap();
+    let written = formats::raster::ImageSource::open(&out).unwrap();
     assert_eq!((written.info().luma.clone(), written.info().bands), (LumaRule::Rgb([1, 2, 3]), 4));
     let [red, alpha] = [1, 4].map(|number| written.read_samples(number, written.window()).unwrap());
     let right = |(red, alpha): (&f32, &f32)| {
@@ -217,7 +217,7 @@ fn colours_keep_their_names() {
 #[test]
 fn a_multispectral_image_follows_the_panchromatic_one_of_its_pass() {
     use camera::ImagePoint;
-    use io::raster::{Band, BandData, ImageSource, write_image_with_rpc};
+    use formats::raster::{Band, BandData, ImageSource, write_image_with_rpc};
     let folder = tempfile::tempdir().unwrap();
     let (run, coarse) = (folder.path().join("run"), folder.path().join("multispectral.tif"));
     let mut command = skysweep();
@@ -228,7 +228,7 @@ fn a_multispectral_image_follows_the_panchromatic_one_of_its_pass() {
     let window = raster::Window { x: 8, y: 16, width: 720, height: 720 };
     let mut samples = pan.read_samples(1, window).unwrap();
     (0..2).for_each(|_| samples = raster::reduce(&samples));
-    let rpc = io::rpc::read_for_image(&sample("view_1.tif")).unwrap().rpc;
+    let rpc = formats::rpc::read_for_image(&sample("view_1.tif")).unwrap().rpc;
     let rpc = rpc.cropped(ImagePoint::new(8.0, 16.0)).rescaled(0.25);
     let samples = samples.map(|v| v.round() as u16);
     let bands = ["blue", "green", "red", "nir"].map(|description| Band { description, data: BandData::U16(&samples) });

@@ -4,8 +4,8 @@
 use std::path::Path;
 
 use crate::common::{band, sample, skysweep};
-use io::points::PointCloud;
-use io::raster::read_dem;
+use formats::points::PointCloud;
+use formats::raster::read_dem;
 use predicates::prelude::*;
 use serde_json::Value;
 

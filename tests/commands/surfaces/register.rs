@@ -11,8 +11,8 @@ use std::sync::OnceLock;
 use crate::common::{sample, simulated, skysweep};
 use camera::{ImagePoint, Rpc};
 use crs::Crs;
+use formats::raster::{Band, BandData, CogRaster, read_dem, write_cog};
 use geodesy::LonLatHeight;
-use io::raster::{Band, BandData, CogRaster, read_dem, write_cog};
 use predicates::prelude::*;
 use raster::Grid;
 use serde_json::Value;
@@ -25,7 +25,7 @@ fn town() -> &'static Path {
 }
 
 fn rpc_of(image: &Path) -> Rpc {
-    io::rpc::read_for_image(image).unwrap().rpc
+    formats::rpc::read_for_image(image).unwrap().rpc
 }
 
 /// Writes view 3 of the town with an RPC that is off by some pixels; returns the RPC that it should
@@ -34,7 +34,7 @@ fn misplaced(path: &Path, [sample, line]: [f64; 2]) -> Rpc {
     let image = town().join("view_3.tif");
     let right = rpc_of(&image);
     let wrong = Rpc { samp_off: right.samp_off + sample, line_off: right.line_off + line, ..right.clone() };
-    io::raster::copy_image_with_rpc(&image, path, &wrong, true).unwrap();
+    formats::raster::copy_image_with_rpc(&image, path, &wrong, true).unwrap();
     right
 }
 
@@ -83,7 +83,7 @@ fn planted_shifts_come_back_and_go_into_every_format() {
             let mut convert = skysweep();
             convert.args(["rpc", "convert"]).arg(&image).arg("--corrections").arg(&report).arg("-o").arg(&out);
             convert.assert().code(0);
-            let written = io::rpc::read(&out).unwrap().rpc;
+            let written = formats::rpc::read(&out).unwrap().rpc;
             assert!(apart(&written, &right) < 0.15, "{name}: {}", apart(&written, &right));
             std::fs::remove_file(&out).unwrap();
         }
@@ -120,7 +120,7 @@ fn a_drift_is_found_by_evidence_and_filled_strips_do_not_count() {
     // The scale of the lines is off by half a percent, which moves the first and the last of them.
     let right = rpc_of(&town().join("view_3.tif"));
     let wrong = Rpc { line_scale: right.line_scale * 1.005, ..right.clone() };
-    io::raster::copy_image_with_rpc(&town().join("view_3.tif"), &image, &wrong, true).unwrap();
+    formats::raster::copy_image_with_rpc(&town().join("view_3.tif"), &image, &wrong, true).unwrap();
     let drift = register(&truth);
     assert_ne!(drift["order"], "shift", "{drift}");
     assert!(drift["rms_px"].as_f64().unwrap() < shift["rms_px"].as_f64().unwrap() + 0.1, "{drift}");

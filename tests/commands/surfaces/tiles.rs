@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use crate::common::{band, sample, skysweep};
 use assert_cmd::Command;
 use crs::MapProjection;
-use io::raster::{Dem, read_dem};
+use formats::raster::{Dem, read_dem};
 use predicates::prelude::*;
 use serde_json::Value;
 use tempfile::TempDir;

@@ -26,7 +26,7 @@ use quick_xml::events::Event;
 use super::error::CityFault;
 use super::format::{CityFormat, Parsed};
 use attributes::Attributes;
-use io::lines::Lines;
+use formats::lines::Lines;
 use walker::Walker;
 
 /// Limit of the depth of elements. Real files have about 25 levels.

@@ -17,7 +17,7 @@ use serde_json::{Map, Value, json};
 use super::schema::VERTICAL;
 use crate::crs_name::{lone_vertical_url, ogc_url};
 use crate::error::{CityError, CityFault};
-use io::atomic::write_stream;
+use formats::atomic::write_stream;
 
 /// Options for writing a CityJSON file.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -14,7 +14,7 @@ use geo::{Area, Coord, LineString, MultiPolygon, Orient, Polygon, unary_union};
 use serde_json::{Value, json};
 
 use crate::error::{CityError, CityFault};
-use io::atomic::write_stream;
+use formats::atomic::write_stream;
 
 /// Area of a polygon below which it is a sliver of rounding, m².
 const AREA_MIN: f64 = 1e-4;

@@ -12,7 +12,7 @@ use city::SurfaceClass;
 use serde_json::{Value, json};
 
 use super::source::Export;
-use io::gltf::{Glb, GlbBuffers};
+use formats::gltf::{Glb, GlbBuffers};
 
 /// Returns the file, or a text for one that is too large.
 pub(super) fn encode(export: &Export<'_>) -> Result<Glb, String> {

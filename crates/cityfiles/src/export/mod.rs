@@ -14,7 +14,7 @@ use std::path::Path;
 use city::{CityModel, TriangleMesh};
 
 use super::error::CityError;
-use io::atomic::{SaveError, write_stream};
+use formats::atomic::{SaveError, write_stream};
 use source::Export;
 
 pub use footprints::{Footprints, write_footprints};

@@ -2,7 +2,7 @@
 
 use std::io::Write;
 
-use io::ply::write_header;
+use formats::ply::write_header;
 
 use super::source::Export;
 

@@ -8,7 +8,7 @@
 use std::fs;
 use std::path::Path;
 
-use io::npy::NpyData;
+use formats::npy::NpyData;
 use raster::{Grid, Window};
 use reconstruct::SurfaceRasters;
 use serde::{Deserialize, Serialize};
@@ -72,7 +72,7 @@ impl ChunkResult {
             }
         };
         let json = serde_json::to_string_pretty(&ChunkRecord { core: self.core, status })?;
-        io::write_bytes(folder.join(RECORD), (json + "\n").as_bytes(), true).map_err(std::io::Error::other)
+        formats::write_bytes(folder.join(RECORD), (json + "\n").as_bytes(), true).map_err(std::io::Error::other)
     }
 
     /// Reads a result that [`ChunkResult::write`] wrote.
@@ -83,7 +83,7 @@ impl ChunkResult {
     pub fn read(folder: &Path) -> Result<Self, DsmError> {
         let path = folder.join(RECORD);
         let failed = |reason: String| DsmError::ChunkFile { path: path.clone(), reason };
-        let json = io::read_regular(&path, TEXT_LIMIT).map_err(|e| failed(e.to_string()))?;
+        let json = formats::read_regular(&path, TEXT_LIMIT).map_err(|e| failed(e.to_string()))?;
         let ChunkRecord { core, status } = serde_json::from_slice(&json).map_err(|e| failed(e.to_string()))?;
         let content = match status {
             Status::Unseen => ChunkContent::Unseen,
@@ -97,17 +97,17 @@ impl ChunkResult {
     }
 }
 
-fn write_rasters(folder: &Path, rasters: &SurfaceRasters) -> Result<(), io::FormatError> {
+fn write_rasters(folder: &Path, rasters: &SurfaceRasters) -> Result<(), formats::FormatError> {
     let shape = [rasters.height_m.height(), rasters.height_m.width()];
     for (name, grid) in
         [("height.npy", &rasters.height_m), ("sigma.npy", &rasters.sigma_m), ("confidence.npy", &rasters.confidence)]
     {
-        io::npy::write(folder.join(name), &shape, grid.data(), true)?;
+        formats::npy::write(folder.join(name), &shape, grid.data(), true)?;
     }
     for (name, grid) in
         [("views.npy", &rasters.views), ("filled.npy", &rasters.filled), ("source.npy", &rasters.source)]
     {
-        io::npy::write(folder.join(name), &shape, grid.data(), true)?;
+        formats::npy::write(folder.join(name), &shape, grid.data(), true)?;
     }
     Ok(())
 }
@@ -144,7 +144,7 @@ fn read_grid<T>(
     take: impl Fn(NpyData) -> Option<Vec<T>>,
 ) -> Result<Grid<T>, DsmError> {
     let failed = |reason: String| DsmError::ChunkFile { path: path.to_owned(), reason };
-    let array = io::npy::read(path).map_err(|e| failed(e.to_string()))?;
+    let array = formats::npy::read(path).map_err(|e| failed(e.to_string()))?;
     if array.shape != [size.1, size.0] {
         return Err(failed(format!("rows and columns are {:?}, expected {:?}", array.shape, [size.1, size.0])));
     }

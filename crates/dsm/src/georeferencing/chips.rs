@@ -9,9 +9,9 @@ use std::collections::BTreeSet;
 
 use camera::{ImagePoint, RpcCamera};
 use crs::MapProjection;
+use formats::ground_points::{GroundPoint, ImageChip};
+use formats::raster::ImageSource;
 use geodesy::LonLatHeight;
-use io::ground_points::{GroundPoint, ImageChip};
-use io::raster::ImageSource;
 use raster::{GeoTransform, Grid, Window};
 use sweep::pointing::{AdjustConfig, Chip, ChipConfig, ChipPlace, ChipSearch, Track, find_chip};
 
@@ -115,7 +115,7 @@ impl OpenChip {
                 ChipGround::Map(map.shifted(origin.sample, origin.line), MapProjection::from_definition(wkt)?)
             }
             // An image without an RPC is compared as it is.
-            _ => match io::rpc::read_for_image(&chip.path) {
+            _ => match formats::rpc::read_for_image(&chip.path) {
                 Ok(found) => ChipGround::Camera(Box::new(RpcCamera::new(found.rpc).cropped(origin))),
                 Err(_) => ChipGround::Pixels,
             },

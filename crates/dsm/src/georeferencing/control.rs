@@ -10,8 +10,8 @@ use std::path::{Path, PathBuf};
 
 use camera::{ImageCorrection, ImagePoint, RpcCamera};
 use crs::{CrsRequest, HeightConverter, MapProjection, VerticalDatum};
+use formats::ground_points::{GroundPoint, ImagePlace, read_ground_points};
 use geodesy::{EnuFrame, LonLatHeight};
-use io::ground_points::{GroundPoint, ImagePlace, read_ground_points};
 use numeric::order_statistic;
 use sweep::pointing::{AdjustConfig, Adjustment, ControlPoint, Observations, Track, adjust_to_control, ground_of};
 

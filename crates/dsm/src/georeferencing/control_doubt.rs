@@ -344,7 +344,7 @@ mod tests {
     fn cameras(up_m: f64) -> Vec<RpcCamera> {
         let town = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../data-samples/town");
         let camera = |i: usize| {
-            let mut rpc = io::rpc::read_for_image(&town.join(format!("view_{i}.tif"))).unwrap().rpc;
+            let mut rpc = formats::rpc::read_for_image(&town.join(format!("view_{i}.tif"))).unwrap().rpc;
             rpc.height_off += up_m;
             RpcCamera::new(rpc)
         };

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crs::{HeightConverter, MapProjection, VerticalDatum};
 use eval::{CellMap, bilinear, convert_heights};
-use io::raster::{Dem, ImageSource, read_dem_window};
+use formats::raster::{Dem, ImageSource, read_dem_window};
 use raster::{GeoTransform, Grid, Window, reduce};
 use reconstruct::DsmGrid;
 
@@ -206,7 +206,7 @@ fn unusable(path: &Path, found: &str, expected: &str) -> DsmError {
 mod tests {
     use super::*;
     use crs::Crs;
-    use io::raster::{Band, BandData, CogRaster, write_cog};
+    use formats::raster::{Band, BandData, CogRaster, write_cog};
 
     /// Writes a hill in cells of `cell_m` around (500000, 4800000) of UTM 31 N.
     fn hill(path: &Path, cell_m: f64, side_m: f64) {

@@ -3,9 +3,9 @@
 //! looks like no-data which nobody declared.
 
 use camera::{ImagePoint, RpcCamera};
+use formats::raster::{ImageSource, LumaRule, RasterError};
+use formats::rpc::RpcFile;
 use geodesy::LonLatHeight;
-use io::raster::{ImageSource, LumaRule, RasterError};
-use io::rpc::RpcFile;
 use raster::{Grid, Window};
 
 /// Difference of two projections of the image below which they are one RPC in two files, pixels. An
@@ -54,7 +54,7 @@ fn contradictions(source: &ImageSource, file: &RpcFile, size: (usize, usize)) ->
         false => format!("{} ({})", file.source.display(), file.format),
     };
     let used = RpcCamera::new(file.rpc.clone());
-    let all = io::rpc::all_of_image(path);
+    let all = formats::rpc::all_of_image(path);
     // GDAL does not say whether its RPC is from inside or from beside the image.
     let origin = all.iter().find(|other| is_same(&used, other, size)).unwrap_or(file);
     let others = all.iter().filter(|other| !is_same(&used, other, size));

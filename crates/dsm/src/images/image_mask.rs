@@ -7,9 +7,9 @@
 use std::path::{Path, PathBuf};
 
 use camera::ImagePoint;
+use formats::areas::AreaName;
+use formats::raster::ImageSource;
 use geodesy::LonLatHeight;
-use io::areas::AreaName;
-use io::raster::ImageSource;
 use raster::{Grid, Window, mark_inside};
 use reconstruct::footprint;
 

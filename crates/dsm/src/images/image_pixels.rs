@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use io::raster::{BandChoice, ImageSource, RasterError};
+use formats::raster::{BandChoice, ImageSource, RasterError};
 use raster::{Grid, Window};
 use rayon::prelude::*;
 use sweep::SweepView;

@@ -8,8 +8,8 @@ use std::fs::{self, Metadata};
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
-use io::ground_points::read_ground_points;
-use io::raster::ImageSource;
+use formats::ground_points::read_ground_points;
+use formats::raster::ImageSource;
 
 use crate::config::DsmConfig;
 use crate::error::DsmError;
@@ -59,7 +59,7 @@ pub fn files_of(config: &DsmConfig) -> Result<BTreeSet<PathBuf>, DsmError> {
     for raster in config.images.iter().chain(&config.dem).chain(&config.reference_dem) {
         files.extend(ImageSource::open(raster)?.files());
     }
-    files.extend(config.images.iter().flat_map(|image| io::rpc::side_files(image)));
+    files.extend(config.images.iter().flat_map(|image| formats::rpc::side_files(image)));
     for points in config.control.iter().filter(|path| path.is_file()) {
         files.extend(
             read_ground_points(points)

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use camera::RpcCamera;
 use serde::{Deserialize, Serialize};
 
-use io::raster::{BandChoice, ImageSource, LumaRule, SampleType};
+use formats::raster::{BandChoice, ImageSource, LumaRule, SampleType};
 use numeric::{Progress, order_statistic};
 use raster::Window;
 
@@ -70,7 +70,7 @@ fn open_one(
     masks: Vec<PathBuf>,
 ) -> Result<SceneImage, DsmError> {
     let source = open_source(path, band)?;
-    let file = io::rpc::read_for_image(path)?;
+    let file = formats::rpc::read_for_image(path)?;
     let doubts = doubts(&source, &file)?;
     Ok(SceneImage {
         path: path.to_owned(),

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use camera::{ImagePoint, RpcCamera};
-use io::stac::SunPosition;
+use formats::stac::SunPosition;
 use raster::Window;
 use reconstruct::{ImageGeometry, ReconstructError, ViewGeometry};
 use serde::{Deserialize, Serialize};

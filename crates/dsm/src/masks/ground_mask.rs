@@ -5,9 +5,9 @@ use std::path::Path;
 
 use crs::MapProjection;
 use eval::CellMap;
+use formats::areas::AreaName;
+use formats::raster::ImageSource;
 use geo::{Area, CoordsIter, Rect};
-use io::areas::AreaName;
-use io::raster::ImageSource;
 use raster::{GeoTransform, Grid, Window, mark_inside};
 use reconstruct::{DsmGrid, GroundMask, MapBounds};
 
@@ -53,12 +53,12 @@ pub(crate) fn mask_on(config: &DsmConfig, grid: &DsmGrid) -> Result<Option<Groun
 pub(crate) fn check_masks(config: &DsmConfig) -> Result<(), DsmError> {
     for path in &config.masks {
         match holds_polygons(path) {
-            true => drop(io::areas::read(path, AreaName::ALL)?),
+            true => drop(formats::areas::read(path, AreaName::ALL)?),
             false => drop(MaskRaster::open(path)?),
         }
     }
     if let Some(area) = &config.area {
-        io::areas::read(&area.file, area.wanted())?;
+        formats::areas::read(&area.file, area.wanted())?;
     }
     Ok(())
 }

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use crs::{CrsError, MapProjection};
+use formats::areas::AreaName;
 use geo::{BooleanOps, BoundingRect, Coord, LineString, MapCoordsInPlace, MultiPoint, MultiPolygon, Polygon, Rect};
-use io::areas::AreaName;
 
 use crate::error::DsmError;
 
@@ -41,7 +41,7 @@ pub(crate) fn read_polygons(
     wanted: AreaName<'_>,
     around: Option<Rect<f64>>,
 ) -> Result<MultiPolygon<f64>, DsmError> {
-    let area = io::areas::read(path, wanted)?;
+    let area = formats::areas::read(path, wanted)?;
     let map = MapProjection::from_definition(&area.crs)?;
     let on_ground = |c: Coord<f64>| map.lonlat_from_map(c.x, c.y).map(|(x, y)| Coord { x, y });
     let ring = |ring: &LineString<f64>| -> Result<LineString<f64>, CrsError> {

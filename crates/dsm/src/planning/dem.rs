@@ -23,7 +23,7 @@ pub(crate) fn dem_heights(
     geometry: &ViewGeometry,
     notes: &mut Notes<'_>,
 ) -> Result<HeightRange, DsmError> {
-    let dem = io::raster::read_dem(path)?;
+    let dem = formats::raster::read_dem(path)?;
     warn_of_datum(path, stated, dem.vertical, notes);
     let no_crs = || {
         let found = format!("a file without coordinate reference system: {}", path.display());

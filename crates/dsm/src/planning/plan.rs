@@ -1,7 +1,7 @@
 //! Third stage of a run: the plan, with everything that is needed to compute a chunk.
 
 use camera::ImageCorrection;
-use io::raster::iso_time;
+use formats::raster::iso_time;
 use numeric::{Choice, Muted};
 use reconstruct::{
     DsmGrid, HeightRange, ImagePair, SceneSweep, SweepLevels, SweepTuning, ViewGeometry, choose_levels, height_step_m,

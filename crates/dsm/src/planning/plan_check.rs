@@ -10,8 +10,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use camera::{ImageCorrection, RpcCamera};
 use crs::MapProjection;
+use formats::raster::iso_time;
 use geodesy::LonLatHeight;
-use io::raster::iso_time;
 use raster::Window;
 use reconstruct::{
     CELLS_MAX, DsmGrid, HeightRange, ImagePair, PYRAMID_LEVELS_MAX, choose_levels, pair_geometry, smallest_sides,

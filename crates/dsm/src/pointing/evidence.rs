@@ -95,7 +95,7 @@ mod tests {
     fn cameras() -> [RpcCamera; 2] {
         [1, 3].map(|i| {
             let path = format!("{}/../../data-samples/town/view_{i}.tif", env!("CARGO_MANIFEST_DIR"));
-            RpcCamera::new(io::rpc::read_for_image(std::path::Path::new(&path)).unwrap().rpc)
+            RpcCamera::new(formats::rpc::read_for_image(std::path::Path::new(&path)).unwrap().rpc)
         })
     }
 

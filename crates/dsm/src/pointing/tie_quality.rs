@@ -167,7 +167,7 @@ mod tests {
     fn cameras() -> Vec<RpcCamera> {
         let camera = |i| {
             let path = format!("{}/../../data-samples/town/view_{i}.tif", env!("CARGO_MANIFEST_DIR"));
-            RpcCamera::new(io::rpc::read_for_image(std::path::Path::new(&path)).unwrap().rpc)
+            RpcCamera::new(formats::rpc::read_for_image(std::path::Path::new(&path)).unwrap().rpc)
         };
         [1, 2, 3].map(camera).to_vec()
     }

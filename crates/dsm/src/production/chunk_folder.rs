@@ -102,7 +102,7 @@ impl ChunkFolder {
 
     /// Returns the status that belongs to the plan; `None` when there is none, or another plan's.
     pub(super) fn status(&self, plan: &str) -> Option<ChunkStatus> {
-        let json = io::read_regular(&self.status_file(), TEXT_LIMIT).ok()?;
+        let json = formats::read_regular(&self.status_file(), TEXT_LIMIT).ok()?;
         serde_json::from_slice::<ChunkStatus>(&json).ok().filter(|status| status.plan == plan)
     }
 
@@ -129,7 +129,7 @@ impl ChunkFolder {
     /// [`FileError::Write`].
     pub(super) fn set_status(&self, plan: &str, state: ChunkState) -> Result<(), FileError> {
         let json = serde_json::to_string(&ChunkStatus { plan: plan.to_owned(), state })? + "\n";
-        Ok(io::write_bytes(self.status_file(), json.as_bytes(), true)?)
+        Ok(formats::write_bytes(self.status_file(), json.as_bytes(), true)?)
     }
 
     /// Checks that nothing but what processes of ours make is in the folder, and that it is reached
@@ -144,7 +144,7 @@ impl ChunkFolder {
         guarded::require_own(&self.0, &is_ours)?;
         // Whatever fields a status of another version has, it names its plan and its state.
         let is_status = |json: serde_json::Value| json.get("plan").is_some() && json.get("state").is_some();
-        match io::read_regular(&self.status_file(), TEXT_LIMIT) {
+        match formats::read_regular(&self.status_file(), TEXT_LIMIT) {
             Ok(json) if !serde_json::from_slice(&json).is_ok_and(is_status) => {
                 let found = format!("{STATUS}, which is not the status of a chunk");
                 Err(FileError::Foreign { path: self.0.clone(), found })

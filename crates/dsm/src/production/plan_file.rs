@@ -98,7 +98,7 @@ impl PlanFile {
         if !path.exists() {
             return Err(ProductionError::NoPlan { path });
         }
-        let json = io::read_regular(&path, TEXT_LIMIT).map_err(|e| failed(e.to_string()))?;
+        let json = formats::read_regular(&path, TEXT_LIMIT).map_err(|e| failed(e.to_string()))?;
         let here = env!("CARGO_PKG_VERSION");
         if let Some(planned) = version_of(&json).filter(|planned| planned != here) {
             return Err(ProductionError::OtherVersion { path, planned, here: here.to_owned() });

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 use classes::{BUILDING, GROUND, LOW_VEGETATION, VEGETATION, WATER};
-use io::points::{CloudExtent, CloudFormat, SurfaceCloud, write_cloud};
+use formats::points::{CloudExtent, CloudFormat, SurfaceCloud, write_cloud};
 use numeric::Progress;
 use raster::Grid;
 use serde::Serialize;

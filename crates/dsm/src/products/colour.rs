@@ -6,7 +6,7 @@
 
 use std::path::Path;
 
-use io::raster::{ImageSource, LumaRule, SampleType};
+use formats::raster::{ImageSource, LumaRule, SampleType};
 use raster::{Grid, fill_voids};
 use serde::Serialize;
 

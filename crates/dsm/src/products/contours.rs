@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use io::raster::{ContourSurface, read_dem, write_contours};
+use formats::raster::{ContourSurface, read_dem, write_contours};
 use numeric::Progress;
 use raster::{gaussian, height_percentiles};
 use serde::Serialize;

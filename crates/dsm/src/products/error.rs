@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use crs::CrsError;
-use io::raster::RasterError;
+use formats::raster::RasterError;
 use numeric::{Cancelled, Failure, Kind, failures};
 
 use job::error::{JobError, SettingError, from_steps, job_errors};

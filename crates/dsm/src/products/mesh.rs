@@ -11,7 +11,7 @@
 
 use std::path::{Path, PathBuf};
 
-use io::textured_mesh::{TexturedMesh, write_textured_glb};
+use formats::textured_mesh::{TexturedMesh, write_textured_glb};
 use numeric::Progress;
 use raster::{AdaptiveMesh, Grid, TileTriangles};
 use serde::Serialize;

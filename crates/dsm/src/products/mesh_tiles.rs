@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use crs::{HeightConverter, VerticalDatum};
+use formats::textured_mesh::{MeshTile, TexturedMesh, write_textured_glb, write_tileset};
 use geodesy::{EnuFrame, EnuPoint, LonLatHeight, ecef_from_ground};
-use io::textured_mesh::{MeshTile, TexturedMesh, write_textured_glb, write_tileset};
 use numeric::Progress;
 use raster::{AdaptiveMesh, GeoTransform, Grid, TileTriangles};
 use rayon::prelude::*;

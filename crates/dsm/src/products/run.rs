@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use io::raster::ImageSource;
+use formats::raster::ImageSource;
 use numeric::{Choice, Progress};
 
 use super::cloud::{self, ClassSources};

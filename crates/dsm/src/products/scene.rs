@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crs::{Crs, MapProjection, VerticalDatum};
-use io::raster::{Dem, ImageSource, read_dem};
+use formats::raster::{Dem, ImageSource, read_dem};
 use numeric::Progress;
 use raster::Grid;
 

@@ -2,7 +2,7 @@
 //!
 //! A further raster is a field of [`SurfaceRasters`] and an entry of [`LAYERS`].
 
-use io::raster::{BandData, SpoolBand};
+use formats::raster::{BandData, SpoolBand};
 use raster::{Grid, NO_DATA, height_percentiles};
 use reconstruct::SurfaceRasters;
 use report::{Legend, LightEnd};

@@ -8,7 +8,7 @@
 use std::path::{Path, PathBuf};
 
 use crs::{Crs, HeightConverter, VerticalDatum};
-use io::raster::{Band, BandData, CogPlace, CogRaster, Provenance, RasterSpool, SpoolBand, write_cog};
+use formats::raster::{Band, BandData, CogPlace, CogRaster, Provenance, RasterSpool, SpoolBand, write_cog};
 use raster::{Grid, Window};
 use reconstruct::{DsmGrid, SurfaceRasters};
 use tempfile::TempDir;
@@ -139,7 +139,7 @@ pub(crate) fn write_config(path: &Path, config: &DsmConfig, folder: &Path) -> Re
     named.map_paths(|path| relative(path, folder));
     let text = toml::to_string_pretty(&named)
         .map_err(|e| DsmError::Output { path: path.to_owned(), source: std::io::Error::other(e) })?;
-    Ok(io::write_bytes(path, text.as_bytes(), false).map_err(FileError::from)?)
+    Ok(formats::write_bytes(path, text.as_bytes(), false).map_err(FileError::from)?)
 }
 
 /// Writes the results of a scene that was computed at once.
@@ -194,7 +194,7 @@ fn write_looks(
     let links = run_links::links("../", PAGE, |name| FILES.contains(&name));
     let page = page::html(config, report, (&crs, grid.gsd_m), &maps, links)
         .map_err(|e| DsmError::Output { path: root.join("report/report.html"), source: std::io::Error::other(e) })?;
-    io::write_bytes(root.join("report/report.html"), page.as_bytes(), false).map_err(FileError::from)?;
+    formats::write_bytes(root.join("report/report.html"), page.as_bytes(), false).map_err(FileError::from)?;
     let (item, collection) = item_and_collection(&stac_rasters(config, grid, report, &crs))?;
     write_json(&root.join("stac/item.json"), &item, false)?;
     Ok(write_json(&root.join("stac/collection.json"), &collection, false)?)
@@ -252,7 +252,7 @@ impl<'a> ChunkedOutput<'a> {
     pub(crate) fn begin(folder: DsmFolder, config: &'a DsmConfig, grid: &'a DsmGrid) -> Result<Self, DsmError> {
         let cell_bytes: u64 = LAYERS.iter().map(|layer| if layer.band().is_float { 4 } else { 1 }).sum();
         let needed_bytes = grid.size.0 as u64 * grid.size.1 as u64 * cell_bytes;
-        io::atomic::require_space(&config.output, needed_bytes).map_err(FileError::from)?;
+        formats::atomic::require_space(&config.output, needed_bytes).map_err(FileError::from)?;
         let spool = |layer: &Layer| RasterSpool::create(folder.spool(layer.stem), grid.size, layer.band());
         let spools = LAYERS.iter().map(spool).collect::<Result<_, _>>()?;
         Ok(Self { config, grid, spools, folder })

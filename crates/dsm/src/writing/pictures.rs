@@ -6,7 +6,7 @@
 
 use std::path::Path;
 
-use io::raster::write_world_file;
+use formats::raster::write_world_file;
 use raster::{Grid, Light, Window};
 use reconstruct::DsmGrid;
 use report::MapLayer;
@@ -78,7 +78,7 @@ impl RunMaps {
     pub(crate) fn write_styles(&self, folder: &Path) -> Result<(), DsmError> {
         for (layer, map) in LAYERS.iter().zip(&self.maps) {
             let style = (layer.legend)(map).qml();
-            io::write_bytes(folder.join(layer.style), style.as_bytes(), false).map_err(FileError::from)?;
+            formats::write_bytes(folder.join(layer.style), style.as_bytes(), false).map_err(FileError::from)?;
         }
         Ok(())
     }
@@ -95,18 +95,18 @@ pub(crate) fn write_pictures(folder: &Path, grid: &DsmGrid, read: ReadLayer<'_>)
     let filled = reduced(read, FILLED_FLAGS, grid.size, side)?;
     let cell_m = grid.gsd_m * side as f64;
     let shade = raster::hillshade(&heights, (cell_m, cell_m), Light::default());
-    io::raster::write_png_rgb(folder.join("hillshade.png"), &raster::shade_picture(&shade), false)?;
+    formats::raster::write_png_rgb(folder.join("hillshade.png"), &raster::shade_picture(&shade), false)?;
     drop(shade);
     let mut picture = relief(&heights, cell_m);
     hatch(&mut picture, &filled);
-    io::raster::write_png_rgb(folder.join("relief.png"), &picture, false)?;
+    formats::raster::write_png_rgb(folder.join("relief.png"), &picture, false)?;
     for name in ["hillshade.png", "relief.png"] {
         write_world_file(&folder.join(name), grid.geotransform, side).map_err(FileError::from)?;
     }
     drop((heights, filled, picture));
     let side = factor(grid.size, THUMBNAIL_SIDE);
     let small = relief(&reduced(read, HEIGHTS, grid.size, side)?, grid.gsd_m * side as f64);
-    io::raster::write_png_rgb(folder.join("thumbnail.png"), &small, false)?;
+    formats::raster::write_png_rgb(folder.join("thumbnail.png"), &small, false)?;
     let thumbnail = folder.join("thumbnail.png");
     write_world_file(&thumbnail, grid.geotransform, side).map_err(FileError::from)?;
     Ok(())

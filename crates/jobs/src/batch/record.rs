@@ -69,7 +69,7 @@ impl TaskRecord {
 
     /// Reads a record; `None` when there is none.
     pub(super) fn read(path: &Path) -> Option<Self> {
-        serde_json::from_slice(&io::read_regular(path, TEXT_LIMIT).ok()?).ok()
+        serde_json::from_slice(&formats::read_regular(path, TEXT_LIMIT).ok()?).ok()
     }
 
     /// Writes the record.
@@ -144,7 +144,7 @@ fn files_of_images(job: &TaskJob) -> Result<BTreeSet<PathBuf>, String> {
         TaskJob::Classes(config) => config.multispectral.as_slice(),
         TaskJob::Eval(_) | TaskJob::HeightMap(_) | TaskJob::Dtm(_) | TaskJob::Products(_) | TaskJob::Diff(_) => &[],
     };
-    Ok(images.iter().filter(|path| path.is_file()).flat_map(|path| io::rpc::side_files(path)).collect())
+    Ok(images.iter().filter(|path| path.is_file()).flat_map(|path| formats::rpc::side_files(path)).collect())
 }
 
 /// Collects the files that the texts of a value name. A folder of a run stands for its surface

@@ -90,7 +90,7 @@ fn steps(batch: &BatchConfig, progress: &dyn Progress) -> Result<BatchReport, Ba
     let report = BatchReport::new(reports);
     write_json(&batch.output.join(REPORT_JSON), &report, true)?;
     let page = report.page();
-    io::write_bytes(batch.output.join(REPORT_PAGE), page.as_bytes(), true).map_err(FileError::from)?;
+    formats::write_bytes(batch.output.join(REPORT_PAGE), page.as_bytes(), true).map_err(FileError::from)?;
     Ok(report)
 }
 

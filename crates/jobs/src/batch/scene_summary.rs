@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use io::read_regular;
+use formats::read_regular;
 use report::{BatchAccuracy, BatchSceneRow, PageLink};
 use serde_json::Value;
 

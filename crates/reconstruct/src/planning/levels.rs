@@ -68,7 +68,7 @@ mod tests {
 
     #[test]
     fn sides_are_those_of_the_views() {
-        let rpc = io::rpc::read_for_image(std::path::Path::new(concat!(
+        let rpc = formats::rpc::read_for_image(std::path::Path::new(concat!(
             env!("CARGO_MANIFEST_DIR"),
             "/../../data-samples/town/view_1.tif"
         )));

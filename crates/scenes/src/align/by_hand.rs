@@ -11,8 +11,8 @@ use std::sync::{Mutex, PoisonError};
 use camera::Similarity;
 use colmap::align::{AlignConfig, AlignError, PointPair, camera_up, fit_level, plane_normal};
 use crs::{CrsError, HeightConverter, MapProjection, VerticalDatum};
-use io::colmap::ColmapEncoding;
-use io::splat_ply::LocalOrigin;
+use formats::colmap::ColmapEncoding;
+use formats::splat_ply::LocalOrigin;
 use numeric::{Progress, order_statistic, upper_median};
 use serde::{Deserialize, Serialize};
 
@@ -223,12 +223,12 @@ impl ManualAlign {
     }
 
     /// The cameras of the model.
-    pub fn cameras(&self) -> &io::colmap::ColmapModel {
+    pub fn cameras(&self) -> &formats::colmap::ColmapModel {
         &self.model.cameras
     }
 
     /// The points of the model.
-    pub fn points(&self) -> &[io::colmap::ColmapPoint] {
+    pub fn points(&self) -> &[formats::colmap::ColmapPoint] {
         &self.model.points
     }
 
@@ -329,7 +329,7 @@ impl ManualAlign {
         writer.write(&config.output, "", similarity)?;
         if !pairs.is_empty() {
             let table = self.table(pairs);
-            io::write_bytes(config.output.join(PAIRS), table.as_bytes(), overwrite).map_err(FileError::write)?;
+            formats::write_bytes(config.output.join(PAIRS), table.as_bytes(), overwrite).map_err(FileError::write)?;
         } else if overwrite {
             // An earlier table would be taken for that of this alignment.
             files::remove(&config.output.join(PAIRS))?;
@@ -400,7 +400,7 @@ fn start(model: &ModelWithPoints, folder: &Path, map: &AlignMap, pivot: [f64; 3]
         let [west, south, east, north] = map.bounds;
         (west..=east).contains(&p[0]) && (south..=north).contains(&p[1])
     };
-    let own = io::read_regular_text(&folder.join("origin.json"), files::TEXT_LIMIT).ok();
+    let own = formats::read_regular_text(&folder.join("origin.json"), files::TEXT_LIMIT).ok();
     let own = own.and_then(|text| serde_json::from_str::<LocalOrigin>(&text).ok());
     let own = own.filter(|own| own.crs == map.crs).map_or([0.0; 3], |own| own.origin);
     if on_map([0, 1, 2].map(|i| pivot[i] + own[i])) {

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use colmap::align::{AlignConfig, NoiseConfig};
 use crs::VerticalDatum;
-use io::colmap::ColmapEncoding;
+use formats::colmap::ColmapEncoding;
 use job::error::JobError;
 use serde::{Deserialize, Serialize};
 

@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use colmap::align::AlignError;
 use crs::CrsError;
+use formats::FormatError;
+use formats::raster::RasterError;
 use geodesy::GeodesyError;
-use io::FormatError;
-use io::raster::RasterError;
 use numeric::{Cancelled, failures};
 
 use job::error::{JobError, from_steps, job_errors};

@@ -17,7 +17,7 @@ use colmap::align::{
     AlignConfig, AlignError, CameraUp, Disturbance, ModelAlignment, NoiseLevel, PointPair, align, align_upright,
     camera_up, disturbed, sensitivity, spread_ratio, tilt_sigma_deg,
 };
-use io::splat_ply::LocalOrigin;
+use formats::splat_ply::LocalOrigin;
 use serde::Serialize;
 
 pub use by_hand::{AlignMap, ManualAlign, ManualAlignConfig, ManualAlignReport, ManualFit, ManualStart};
@@ -102,7 +102,7 @@ pub struct AlignResidual {
 /// let folder = tempfile::tempdir()?;
 /// let table = folder.path().join("gps.csv");
 /// let mut text = "name,easting,northing,height\n".to_owned();
-/// for view in io::colmap::read(model.as_ref())?.views {
+/// for view in formats::colmap::read(model.as_ref())?.views {
 ///     let [x, y, z] = view.pose.centre;
 ///     text += &format!("{},{x},{y},{z}\n", view.name);
 /// }
@@ -125,7 +125,7 @@ fn steps(config: &AlignJobConfig, progress: &dyn Progress) -> Result<AlignJobRep
     progress.begin("alignment", 3);
     let model = read_model(&config.model, progress)?;
     progress.step();
-    let positions = io::control::read(&config.positions)?;
+    let positions = formats::control::read(&config.positions)?;
     let world = World::of(&positions, config.crs_epsg, config.vertical)?;
     let known = world.known(&positions, &model.cameras)?;
     let search = AlignConfig { threshold_m: config.threshold_m, seed: config.seed, ..AlignConfig::default() };
@@ -186,11 +186,11 @@ fn held_up(model: &ModelWithPoints) -> Option<CameraUp> {
 fn read_model(folder: &Path, progress: &dyn Progress) -> Result<ModelWithPoints, AlignJobError> {
     let has_points = ["points3D.bin", "points3D.txt"].iter().any(|name| folder.join(name).is_file());
     if has_points {
-        let (cameras, points) = io::colmap::read_with_points(folder)?;
+        let (cameras, points) = formats::colmap::read_with_points(folder)?;
         return Ok(ModelWithPoints { cameras, points });
     }
     progress.warn(&format!("the model has no points3D: only its cameras are aligned: {}", folder.display()));
-    Ok(ModelWithPoints { cameras: io::colmap::read(folder)?, points: Vec::new() })
+    Ok(ModelWithPoints { cameras: formats::colmap::read(folder)?, points: Vec::new() })
 }
 
 fn report(

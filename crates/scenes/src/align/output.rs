@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use camera::Similarity;
-use io::colmap::{ColmapEncoding, ColmapModel, ColmapPoint, ColmapView};
-use io::splat_ply::LocalOrigin;
+use formats::colmap::{ColmapEncoding, ColmapModel, ColmapPoint, ColmapView};
+use formats::splat_ply::LocalOrigin;
 use serde::Serialize;
 
 use job::files::{self, FileError};
@@ -57,6 +57,6 @@ impl ModelWriter<'_> {
         self.origin.write(&folder.join("origin.json"), self.overwrite).map_err(FileError::write)?;
         let parts = SimilarityParts::from(world_from_model);
         files::write_json(&folder.join("similarity.json"), &parts, self.overwrite)?;
-        io::colmap::write(folder, &moved, &points, self.encoding, self.overwrite).map_err(FileError::write)
+        formats::colmap::write(folder, &moved, &points, self.encoding, self.overwrite).map_err(FileError::write)
     }
 }

@@ -6,7 +6,7 @@
 use std::path::PathBuf;
 
 use camera::{ImagePoint, Lens, LensModel};
-use io::raster::ImageSource;
+use formats::raster::ImageSource;
 use raster::Grid;
 use report::png_with_alpha;
 

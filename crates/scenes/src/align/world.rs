@@ -5,10 +5,10 @@ use std::collections::HashMap;
 
 use colmap::align::PointPair;
 use crs::{HeightConverter, MapProjection, VerticalDatum};
+use formats::colmap::ColmapModel;
+use formats::control::{ControlPosition, Place, Subject};
+use formats::splat_ply::LocalOrigin;
 use geodesy::utm_epsg;
-use io::colmap::ColmapModel;
-use io::control::{ControlPosition, Place, Subject};
-use io::splat_ply::LocalOrigin;
 use numeric::upper_median;
 
 use super::error::AlignJobError;

@@ -4,9 +4,9 @@ use std::path::Path;
 
 use ::train::{Drawing, PinholeView, Registers, Surfel};
 use camera::{Lens, LensModel};
-use io::colmap::{ColmapModel, ColmapView};
-use io::npy::{self, NpyData};
-use io::raster::ImageSource;
+use formats::colmap::{ColmapModel, ColmapView};
+use formats::npy::{self, NpyData};
+use formats::raster::ImageSource;
 use numeric::Progress;
 use raster::Grid;
 
@@ -69,7 +69,7 @@ enum Source<'a> {
 
 /// Reads splats into the frame of a dataset. Without an origin they are in it already.
 fn splats(path: &Path, place: &DatasetPlace) -> Result<Vec<Surfel>, MeshJobError> {
-    let file = io::splat_files::read(path)?;
+    let file = formats::splat_files::read(path)?;
     let from = file.origin.map_or(place.origin.origin, |origin| origin.origin);
     let shift = [0, 1, 2].map(|i| (from[i] - place.origin.origin[i]) as f32);
     let moved = |splat: &gaussian::Splat| {

@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use io::FormatError;
-use io::raster::RasterError;
+use formats::FormatError;
+use formats::raster::RasterError;
 use numeric::{Cancelled, failures};
 use tsdf::FusionError;
 

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use cityfiles::surfaces::SurfaceFile;
-use io::coloured_mesh::{ColouredMesh, write_mesh_glb, write_mesh_ply};
+use formats::coloured_mesh::{ColouredMesh, write_mesh_glb, write_mesh_ply};
 use numeric::Progress;
 use serde::Serialize;
 use tsdf::{DepthView, FusedMesh, TsdfConfig, fuse};
@@ -95,7 +95,7 @@ fn report_path(mesh: &Path) -> PathBuf {
 }
 
 fn make(config: &MeshJobConfig, progress: &dyn Progress) -> Result<MeshJobReport, MeshJobError> {
-    let mut model = io::colmap::read(&sparse_folder(&config.dataset))?;
+    let mut model = formats::colmap::read(&sparse_folder(&config.dataset))?;
     let place = DatasetPlace::read(&config.dataset, &mut model)?;
     let maps = depths::read(config, &model, &place, progress)?;
     progress.check_cancelled()?;

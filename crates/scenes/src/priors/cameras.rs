@@ -9,7 +9,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use ::priors::MAX_PIXELS;
-use io::colmap::{self, ColmapModel, ColmapPoint};
+use formats::colmap::{self, ColmapModel, ColmapPoint};
 
 use super::config::{PriorsConfig, PriorsMode, PriorsTrainer};
 use super::error::PriorsJobError;
@@ -100,7 +100,7 @@ fn load(config: &PriorsConfig, source: &Path) -> Result<(ColmapModel, Vec<Colmap
         if ending.as_deref() != Some("json") {
             return Err(PriorsJobError::NotCameras { path: source.to_owned() });
         }
-        return Ok((io::transforms::read(source, config.image_size)?, Vec::new()));
+        return Ok((formats::transforms::read(source, config.image_size)?, Vec::new()));
     }
     let has_points = ["points3D.bin", "points3D.txt"].iter().any(|name| source.join(name).is_file());
     if config.mode == PriorsMode::BuildingEnhanced && !config.maps_only && has_points {

@@ -7,9 +7,9 @@ use camera::{FitError, LensError, SimilarityError};
 use city::ModelError;
 use cityfiles::CityError;
 use crs::CrsError;
-use io::FormatError;
-use io::raster::RasterError;
-use io::rpc::RpcReadError;
+use formats::FormatError;
+use formats::raster::RasterError;
+use formats::rpc::RpcReadError;
 use numeric::{Cancelled, Kind, failures};
 use report::PictureError;
 

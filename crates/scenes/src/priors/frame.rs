@@ -7,7 +7,7 @@
 use ::priors::View;
 use camera::Similarity;
 use city::ModelPoint;
-use io::colmap::ColmapView;
+use formats::colmap::ColmapView;
 use serde_json::{Value, json};
 
 use super::cameras::SceneCameras;
@@ -34,7 +34,7 @@ impl DatasetFrame {
         cameras: &SceneCameras,
     ) -> Result<Self, PriorsJobError> {
         let camera_from_model = match (&config.transform, config.offset) {
-            (Some(path), _) => io::similarity::read(path)?,
+            (Some(path), _) => formats::similarity::read(path)?,
             (None, Some([x, y, z])) => shift([-x, -y, -z]).map_err(PriorsJobError::Offset)?,
             (None, None) => Similarity::IDENTITY,
         };

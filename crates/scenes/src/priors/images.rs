@@ -6,7 +6,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use io::raster::{ImageSource, write_png_rgba};
+use formats::raster::{ImageSource, write_png_rgba};
 use raster::Grid;
 
 use super::cameras::SceneCameras;

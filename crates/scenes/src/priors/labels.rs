@@ -4,8 +4,8 @@
 use std::collections::BTreeSet;
 
 use city::{CityModel, SurfaceClass, TriangleMesh};
+use formats::splat_ply::{LabelTable, LabelledObject, SplatLabels};
 use gaussian::SplatLabel;
-use io::splat_ply::{LabelTable, LabelledObject, SplatLabels};
 use serde_json::{Value, json};
 
 /// Returns the content of `labels.json`: names of classes, and identifiers of the objects in use.

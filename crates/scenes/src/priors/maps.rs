@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use ::priors::{DepthKind, MISSING_CLASS, NO_OBJECT, NormalFrame, PriorMaps, Rays};
-use io::npy::{self, NpyArray, NpyData};
-use io::raster::{Band, BandData, DepthScale, write_depth_png, write_map, write_png_gray, write_png_rgb};
+use formats::npy::{self, NpyArray, NpyData};
+use formats::raster::{Band, BandData, DepthScale, write_depth_png, write_map, write_png_gray, write_png_rgb};
 use numeric::Progress;
 use raster::{Grid, NO_DATA};
 use report::{ViewPictures, ViewRow, depth_preview, mask_preview, normal_preview, side_by_side};

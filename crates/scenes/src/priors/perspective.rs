@@ -137,7 +137,7 @@ fn write(dataset: &Dataset<'_>, folder: &Path, progress: &dyn Progress) -> Resul
     files::write_json(&folder.join("origin.json"), &dataset.frame.describe(&city_model.crs), false)?;
     let report = report(dataset, &written)?;
     let page = report.html(&written.pictures)?;
-    io::write_bytes(folder.join("report.html"), page.as_bytes(), false).map_err(FileError::from)?;
+    formats::write_bytes(folder.join("report.html"), page.as_bytes(), false).map_err(FileError::from)?;
     files::write_json(&folder.join("report.json"), &report.json().map_err(FileError::from)?, false)?;
     Ok(report)
 }

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use ::priors::{Sample, initial_splats, surface_label};
-use io::colmap::{self, ColmapEncoding, ColmapModel, ColmapObservation, ColmapPoint};
-use io::ply::{self, PlyPoint};
-use io::splat_ply::{self, LocalOrigin, SplatFile, SplatForm, SplatLayout};
+use formats::colmap::{self, ColmapEncoding, ColmapModel, ColmapObservation, ColmapPoint};
+use formats::ply::{self, PlyPoint};
+use formats::splat_ply::{self, LocalOrigin, SplatFile, SplatForm, SplatLayout};
 
 use super::dataset::Dataset;
 use super::labels::{colour, with_table};

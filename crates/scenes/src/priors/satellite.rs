@@ -9,7 +9,7 @@ use ::priors::{
 use camera::{ImageCorrection, Rpc, RpcCamera};
 use city::CrsReference;
 use cityfiles::CityFile;
-use io::raster::{Band, BandData, ImageSource, Provenance, write_map_with_rpc, write_png_rgb};
+use formats::raster::{Band, BandData, ImageSource, Provenance, write_map_with_rpc, write_png_rgb};
 use numeric::Progress;
 use raster::NO_DATA;
 use report::{SatellitePriorsReport, SatelliteRow, ViewPictures, height_preview, normal_preview};
@@ -59,7 +59,7 @@ pub(super) fn make(
     let (rows, pictures) = writer.write_all(&images, progress)?;
     let report = report(config, &read.file, &model, &place, rows, unusable);
     let page = report.html(&pictures)?;
-    io::write_bytes(partial.path().join("report.html"), page.as_bytes(), false).map_err(FileError::from)?;
+    formats::write_bytes(partial.path().join("report.html"), page.as_bytes(), false).map_err(FileError::from)?;
     files::write_json(&partial.path().join("labels.json"), &labels(&read.file.model, model.mesh()), false)?;
     files::write_json(&partial.path().join("report.json"), &report.json().map_err(FileError::from)?, false)?;
     let bytes = files::bytes_below(partial.path());

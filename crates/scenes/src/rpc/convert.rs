@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use camera::RpcCamera;
-use io::rpc::RpcFormat;
+use formats::rpc::RpcFormat;
 use serde::{Deserialize, Serialize};
 
 use super::error::RpcJobError;
@@ -76,7 +76,7 @@ impl RpcConvertConfig {
 /// let folder = tempfile::tempdir()?;
 /// let config = RpcConvertConfig::new(image.into(), folder.path().join("view_1.json"));
 /// let report = convert(&config, &numeric::Silent)?;
-/// assert_eq!(io::rpc::read(&report.output)?.rpc, io::rpc::read(image.as_ref())?.rpc);
+/// assert_eq!(formats::rpc::read(&report.output)?.rpc, formats::rpc::read(image.as_ref())?.rpc);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn convert(config: &RpcConvertConfig, progress: &dyn Progress) -> Result<RpcConvertReport, JobError> {
@@ -101,8 +101,10 @@ fn steps(config: &RpcConvertConfig, progress: &dyn Progress) -> Result<RpcConver
         }
     };
     match format {
-        RpcFormat::TiffTag => io::raster::copy_image_with_rpc(&config.file, &config.output, &rpc, config.overwrite)?,
-        format => io::rpc::write(&config.output, &rpc, format, config.overwrite)?,
+        RpcFormat::TiffTag => {
+            formats::raster::copy_image_with_rpc(&config.file, &config.output, &rpc, config.overwrite)?
+        }
+        format => formats::rpc::write(&config.output, &rpc, format, config.overwrite)?,
     }
     Ok(RpcConvertReport {
         source: file.source,

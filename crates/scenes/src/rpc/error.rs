@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use camera::{CameraError, FitError};
-use io::FormatError;
-use io::raster::RasterError;
-use io::rpc::{ReadOnlyFormat, RpcReadError};
+use formats::FormatError;
+use formats::raster::RasterError;
+use formats::rpc::{ReadOnlyFormat, RpcReadError};
 use numeric::{Kind, failures};
 
 use job::error::{JobError, SettingError, from_steps, job_errors};
@@ -117,7 +117,7 @@ pub(crate) enum RpcJobError {
     },
     /// A text of the dataset cannot be written.
     #[error(transparent)]
-    Text(#[from] io::atomic::SaveError),
+    Text(#[from] formats::atomic::SaveError),
     /// A setting or a file cannot be used.
     #[error(transparent)]
     Job(#[from] JobError),

@@ -10,10 +10,10 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use camera::{ImagePoint, Rpc, RpcCamera};
+use formats::raster::{Band, BandData, ImageSource, SampleType, iso_time, write_image_with_rpc};
+use formats::rpc::RpcFormat;
+use formats::stac::SunPosition;
 use geodesy::LonLatHeight;
-use io::raster::{Band, BandData, ImageSource, SampleType, iso_time, write_image_with_rpc};
-use io::rpc::RpcFormat;
-use io::stac::SunPosition;
 use numeric::{Progress, percentile};
 use raster::{Grid, Window};
 use serde::{Deserialize, Serialize};
@@ -184,7 +184,7 @@ fn steps(config: &RpcExportConfig, progress: &dyn Progress) -> Result<RpcExportR
         let lines: Vec<String> =
             images.iter().filter(|image| image.held_out == is_test).map(|image| image.name.clone() + ".json").collect();
         // The readers split at line breaks, so that a last one would name a file without a name.
-        io::atomic::write_bytes(work.path().join(CAMERAS).join(list), lines.join("\n").as_bytes(), false)?;
+        formats::atomic::write_bytes(work.path().join(CAMERAS).join(list), lines.join("\n").as_bytes(), false)?;
     }
     let report =
         RpcExportReport { output: config.output.clone(), height_range_m: scene.height_range_m, images, residual_px };
@@ -253,7 +253,7 @@ impl Export<'_> {
         let bands = bands.map(|(description, band)| Band { description, data: BandData::U8(band) });
         let image = format!("{name}.tif");
         write_image_with_rpc(self.folder.join(IMAGES).join(&image), &bands, &rpc, None, false)?;
-        let text = io::rpc::to_text(&rpc, RpcFormat::Json)?;
+        let text = formats::rpc::to_text(&rpc, RpcFormat::Json)?;
         let [low, high] = self.scene.height_range_m;
         let mut record = json!({
             "img": image,

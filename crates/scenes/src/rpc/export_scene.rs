@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use crs::{HeightConverter, MapProjection, VerticalDatum};
-use io::raster::{RasterError, read_dem};
+use formats::raster::{RasterError, read_dem};
 use numeric::Progress;
 
 use super::error::RpcJobError;

@@ -8,8 +8,8 @@
 use std::path::PathBuf;
 
 use camera::{CameraError, ImagePoint, Rpc, RpcCamera};
+use formats::rpc::RpcFormat;
 use geodesy::LonLatHeight;
-use io::rpc::RpcFormat;
 use job::error::JobError;
 use serde::{Deserialize, Serialize};
 

@@ -18,5 +18,5 @@ use job::error::JobError;
 /// usable RPC.
 pub fn camera_of_run(run: &Path, image: &Path) -> Result<RpcCamera, JobError> {
     let (place, correction) = image_of_run(run, image)?;
-    Ok(RpcCamera { rpc: io::rpc::read_for_image(&place)?.rpc, correction })
+    Ok(RpcCamera { rpc: formats::rpc::read_for_image(&place)?.rpc, correction })
 }

@@ -4,8 +4,8 @@
 use std::path::Path;
 
 use camera::{ImagePoint, Rpc};
-use io::raster::{ImageSource, SampleType, iso_time};
-use io::stac::SunPosition;
+use formats::raster::{ImageSource, SampleType, iso_time};
+use formats::stac::SunPosition;
 use serde::Serialize;
 
 /// The image of an RPC.
@@ -115,7 +115,7 @@ mod tests {
     fn an_image_tells_its_size_bands_and_ground() {
         let town = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../data-samples/town"));
         let path = town.join("view_1.tif");
-        let rpc = io::rpc::read(&path).unwrap().rpc;
+        let rpc = formats::rpc::read(&path).unwrap().rpc;
         let image = of_file(&path, &rpc).unwrap();
         assert!(image.width > 100 && image.bands.len() == 1);
         let [[west, north], [east, _], [_, south], _] = image.footprint_deg.unwrap();

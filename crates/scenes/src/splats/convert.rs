@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
+use formats::splat_files::{self, SplatFormat};
+use formats::splat_ply::{SH_DEGREE_MAX, SplatFile, SplatForm, SplatLayout};
 use gaussian::Splat;
-use io::splat_files::{self, SplatFormat};
-use io::splat_ply::{SH_DEGREE_MAX, SplatFile, SplatForm, SplatLayout};
 use numeric::Progress;
 use serde::{Deserialize, Serialize};
 

@@ -8,10 +8,10 @@ use camera::SimilarityError;
 use city::ModelError;
 use cityfiles::CityError;
 use crs::CrsError;
-use io::FormatError;
-use io::raster::RasterError;
-use io::rpc::RpcReadError;
-use io::splat_ply::LocalOrigin;
+use formats::FormatError;
+use formats::raster::RasterError;
+use formats::rpc::RpcReadError;
+use formats::splat_ply::LocalOrigin;
 use numeric::{Cancelled, failures};
 
 use job::error::{JobError, SettingError, from_steps, job_errors};

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use camera::RpcCamera;
-use io::raster::{ImageSource, RasterError};
+use formats::raster::{ImageSource, RasterError};
 use numeric::Progress;
 use raster::Grid;
 

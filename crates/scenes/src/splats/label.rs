@@ -12,9 +12,9 @@ use ::priors::{ModelPlace, PriorModel, buildings_of, splat_labels};
 use camera::{Similarity, SimilarityError};
 use city::{CrsReference, MeshConfig, SurfaceClass, TriangleMesh};
 use crs::{CrsIdentity, VerticalDatum};
+use formats::splat_files;
+use formats::splat_ply::LocalOrigin;
 use gaussian::SplatLabel;
-use io::splat_files;
-use io::splat_ply::LocalOrigin;
 use numeric::Progress;
 use serde::{Deserialize, Serialize};
 
@@ -192,7 +192,7 @@ fn mesh_from_splats(
     let start = [mesh.origin.x, mesh.origin.y, mesh.origin.z];
     let local = origin.map_or([0.0; 3], |origin| origin.origin);
     if let Some(path) = &config.transform {
-        let model_from_frame = io::similarity::read(path)?.inverse();
+        let model_from_frame = formats::similarity::read(path)?.inverse();
         return Ok(shift(start.map(|c| -c))?.after(&model_from_frame.after(&shift(local)?)));
     }
     let unplaced = || SplatsJobError::NotPlaced { path: config.splats.clone() };

@@ -7,8 +7,8 @@ use ::splats::{
     ViewReport, make_splats,
 };
 use crs::VerticalDatum;
-use io::raster::{read_dem, write_png_rgb};
-use io::splat_ply::{LocalOrigin, SplatFile, SplatForm, SplatLayout};
+use formats::raster::{read_dem, write_png_rgb};
+use formats::splat_ply::{LocalOrigin, SplatFile, SplatForm, SplatLayout};
 use numeric::Progress;
 use raster::Grid;
 use serde::{Deserialize, Serialize};
@@ -209,7 +209,7 @@ fn make_and_write(config: &SplatsConfig, progress: &dyn Progress) -> Result<Spla
     let corrections = Corrections::for_surface(&config.dsm, &config.corrections)?.of_images(&config.images);
     corrections.write(&pointing_path(&config.output), config.overwrite)?;
     let file = SplatFile { splats: scene.splats, harmonics: None, labels: None, layout, origin: Some(local) };
-    io::splat_files::write(&config.output, &file, config.overwrite).map_err(FileError::write)?;
+    formats::splat_files::write(&config.output, &file, config.overwrite).map_err(FileError::write)?;
     write_renderings(config, &scene.renderings)?;
     Ok(SplatsReport::new(config, scene.report))
 }

@@ -19,11 +19,11 @@ use ::splats::{LensSplatCamera, Rendering, RpcSplatCamera, SplatCamera, psnr_db,
 use ::train::{Drawing, PinholeView, Registers, Surfel, SurfelCamera};
 use camera::{Lens, LensModel};
 use crs::{CrsError, MapProjection};
+use formats::colmap::{ColmapModel, ColmapView};
+use formats::npy;
+use formats::raster::{write_png_gray, write_png_rgb};
+use formats::splat_ply::{LocalOrigin, SplatFile};
 use gaussian::{Splat, SplatLabel};
-use io::colmap::{ColmapModel, ColmapView};
-use io::npy;
-use io::raster::{write_png_gray, write_png_rgb};
-use io::splat_ply::{LocalOrigin, SplatFile};
 use numeric::Progress;
 use raster::Grid;
 use serde::{Deserialize, Serialize};
@@ -180,12 +180,14 @@ fn steps(config: &SplatRenderConfig, progress: &dyn Progress) -> Result<SplatRen
     config.validate()?;
     let folder = OutputFolder::take(&config.output)?;
     folder.check_folders(["colour", "alpha", "height", "depth", "class", "object"])?;
-    let file = io::splat_files::read(&config.splats)?;
+    let file = formats::splat_files::read(&config.splats)?;
     let unplaced = || LocalOrigin::new(UNKNOWN_FRAME, UNKNOWN_DATUM, [0.0; 3]);
     // Files of other programs lie in the frame of their cameras.
     let origin = match file.origin.clone() {
         None if config.images.is_empty() => unplaced(),
-        found => found.ok_or_else(|| SplatsJobError::NoOrigin { path: io::splat_ply::origin_path(&config.splats) })?,
+        found => {
+            found.ok_or_else(|| SplatsJobError::NoOrigin { path: formats::splat_ply::origin_path(&config.splats) })?
+        }
     };
     folder.remove(REPORT)?;
     if let Some(labels) = &file.labels {
@@ -232,7 +234,7 @@ impl RenderSession<'_> {
     fn run(mut self, progress: &dyn Progress) -> Result<Vec<SplatRenderView>, SplatsJobError> {
         let placed = |folder: &PathBuf| match &self.file.origin {
             Some(origin) => placed_model::read(folder, origin),
-            None => Ok(io::colmap::read(&sparse_folder(folder))?),
+            None => Ok(formats::colmap::read(&sparse_folder(folder))?),
         };
         let model = self.config.cameras.as_ref().map(placed).transpose()?;
         let beside = pointing_path(&self.config.splats);

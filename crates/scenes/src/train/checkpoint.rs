@@ -30,12 +30,12 @@ impl Checkpoint {
         for mask in left_out {
             bytes.extend(mask.chunks(8).map(|pixels| (0..pixels.len()).map(|k| u8::from(pixels[k]) << k).sum::<u8>()));
         }
-        Ok(io::write_bytes(path, &bytes, true)?)
+        Ok(formats::write_bytes(path, &bytes, true)?)
     }
 
     /// Whether a training wrote a file, by its beginning.
     pub(super) fn is_ours(path: &Path) -> bool {
-        io::read_regular(path, LIMIT).is_ok_and(|bytes| bytes.starts_with(MAGIC))
+        formats::read_regular(path, LIMIT).is_ok_and(|bytes| bytes.starts_with(MAGIC))
     }
 
     /// Returns the number of iterations that are done; `None` where there is no checkpoint.
@@ -44,7 +44,7 @@ impl Checkpoint {
             return Ok(None);
         }
         let bytes =
-            io::read_regular(path, LIMIT).map_err(|source| FileError::Read { path: path.to_owned(), source })?;
+            formats::read_regular(path, LIMIT).map_err(|source| FileError::Read { path: path.to_owned(), source })?;
         let state = parts(&bytes).and_then(|(state, _)| TrainingState::from_bytes(state));
         Ok(Some(state.map_err(|source| TrainError::Checkpoint { path: path.to_owned(), source })?.iteration))
     }
@@ -56,7 +56,7 @@ impl Checkpoint {
         pictures: usize,
     ) -> Result<Self, TrainError> {
         let bytes =
-            io::read_regular(path, LIMIT).map_err(|source| FileError::Read { path: path.to_owned(), source })?;
+            formats::read_regular(path, LIMIT).map_err(|source| FileError::Read { path: path.to_owned(), source })?;
         let defect = |source| TrainError::Checkpoint { path: path.to_owned(), source };
         let (state, mut rest) = parts(&bytes).map_err(defect)?;
         let state = TrainingState::from_bytes(state).map_err(defect)?;

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use ::train::{PinholeView, TrainingView};
-use io::colmap::{ColmapPoint, read_with_points};
-use io::npy::{self, NpyArray, NpyData};
+use formats::colmap::{ColmapPoint, read_with_points};
+use formats::npy::{self, NpyArray, NpyData};
 use numeric::Progress;
 use priors::Schedule;
 use raster::Grid;

@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use ::train::CheckpointDefect;
 use crs::CrsError;
-use io::FormatError;
-use io::raster::RasterError;
-use io::rpc::RpcReadError;
+use formats::FormatError;
+use formats::raster::RasterError;
+use formats::rpc::RpcReadError;
 use numeric::{Cancelled, failures};
 
 use job::error::{JobError, SettingError, from_steps, job_errors};

@@ -2,8 +2,8 @@
 //! that see them say. Views that are held out say nothing.
 
 use ::train::{Surfel, SurfelCamera};
+use formats::colmap::ColmapPoint;
 use gaussian::quaternion_of_axes;
-use io::colmap::ColmapPoint;
 use rstar::RTree;
 use rstar::primitives::GeomWithData;
 

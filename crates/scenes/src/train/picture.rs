@@ -13,8 +13,8 @@
 use std::path::{Path, PathBuf};
 
 use camera::{ImagePoint, Lens, LensModel};
-use io::colmap::ColmapView;
-use io::raster::ImageSource;
+use formats::colmap::ColmapView;
+use formats::raster::ImageSource;
 use raster::Grid;
 use rayon::prelude::*;
 

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use io::colmap::{ColmapModel, ColmapObservation, ColmapPoint, ColmapView, read_with_points};
-use io::splat_ply::LocalOrigin;
+use formats::colmap::{ColmapModel, ColmapObservation, ColmapPoint, ColmapView, read_with_points};
+use formats::splat_ply::LocalOrigin;
 
 use super::error::TrainError;
 use job::dataset_folder::{UNKNOWN_FRAME, dataset_origin};

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use ::train::TrainingState;
-use io::FormatError;
-use io::splat_ply::{self, LocalOrigin, SplatFile, SplatForm, SplatLayout};
+use formats::FormatError;
+use formats::splat_ply::{self, LocalOrigin, SplatFile, SplatForm, SplatLayout};
 
 use super::checkpoint::Checkpoint;
 use super::error::TrainError;

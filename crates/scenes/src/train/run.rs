@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use ::train::{Drawing, PinholeView, Registers, TrainingConfig, TrainingState, TrainingView};
-use io::raster::write_png_rgb;
+use formats::raster::write_png_rgb;
 use numeric::Progress;
 use raster::Grid;
 use report::Comparison;

@@ -11,8 +11,8 @@ use ::splats::RpcSplatCamera;
 use ::train::{Drawing, LatticeBox, LatticeView, MAX_SIDE, Registers, Surfel, SurfelImages, TrainingView};
 use camera::RpcCamera;
 use crs::MapProjection;
-use io::raster::{Dem, ImageSource};
-use io::splat_ply::LocalOrigin;
+use formats::raster::{Dem, ImageSource};
+use formats::splat_ply::LocalOrigin;
 use numeric::{Progress, upper_median};
 use raster::{GeoTransform, Grid, Window};
 
@@ -60,10 +60,13 @@ const OPACITY_LOGIT_MAX: f32 = 3.0;
 impl PlacedSurfels {
     /// Reads splats whose heights are above the ellipsoid.
     pub(super) fn read(path: &Path) -> Result<Self, TrainError> {
-        let file = io::splat_files::read(path)?;
+        let file = formats::splat_files::read(path)?;
         let invalid = |what: String| TrainError::Dataset { path: path.to_owned(), what };
         let origin = file.origin.ok_or_else(|| {
-            invalid(format!("no origin beside the splats: expected {}", io::splat_ply::origin_path(path).display()))
+            invalid(format!(
+                "no origin beside the splats: expected {}",
+                formats::splat_ply::origin_path(path).display()
+            ))
         })?;
         if origin.vertical != "ellipsoid" {
             return Err(invalid(format!(

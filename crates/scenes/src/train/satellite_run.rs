@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use ::train::{Drawing, LatticeView, Registers, Surfel, SurfelCamera, TrainingConfig, TrainingState, TrainingView};
 use crs::Crs;
-use io::raster::{Band, BandData, CogRaster, read_dem, write_cog, write_png_rgb};
+use formats::raster::{Band, BandData, CogRaster, read_dem, write_cog, write_png_rgb};
 use numeric::Progress;
 use raster::Grid;
 use serde::{Deserialize, Serialize};

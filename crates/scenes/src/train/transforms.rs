@@ -5,7 +5,7 @@
 
 use std::path::{Path, PathBuf};
 
-use io::colmap::{ColmapModel, ColmapObservation, ColmapPoint};
+use formats::colmap::{ColmapModel, ColmapObservation, ColmapPoint};
 use numeric::SplitMix64;
 
 use super::error::TrainError;
@@ -29,7 +29,7 @@ pub(super) fn file(folder: &Path, sparse: &Path) -> Option<PathBuf> {
 
 /// Reads the cameras. Images get the endings that their files in `images` have.
 pub(super) fn read(path: &Path, images: &Path) -> Result<ColmapModel, TrainError> {
-    let mut model = io::transforms::read(path, None)?;
+    let mut model = formats::transforms::read(path, None)?;
     for view in &mut model.views {
         let ended = ENDINGS.iter().map(|ending| format!("{}{ending}", view.name));
         if let Some(name) = ended.into_iter().find(|name| images.join(name).is_file()) {
@@ -110,7 +110,7 @@ fn middle(model: &ColmapModel) -> [f64; 3] {
 mod tests {
     use super::*;
     use camera::{Lens, LensModel, Pose};
-    use io::colmap::ColmapView;
+    use formats::colmap::ColmapView;
 
     #[test]
     fn random_points_lie_where_the_cameras_look() {

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use buildings::BuildingIndexError;
 use camera::CameraError;
 use crs::CrsError;
-use io::raster::RasterError;
-use io::rpc::RpcReadError;
+use formats::raster::RasterError;
+use formats::rpc::RpcReadError;
 use numeric::{Cancelled, failures};
 
 use crate::ortho::OrthoError;

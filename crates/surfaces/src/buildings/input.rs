@@ -4,8 +4,8 @@ use std::path::Path;
 
 use camera::{ImagePoint, Rpc, RpcCamera};
 use crs::{Crs, MapProjection};
-use io::raster::{ImageSource, Provenance, iso_time, read_dem_window};
-use io::rpc::RpcReadError;
+use formats::raster::{ImageSource, Provenance, iso_time, read_dem_window};
+use formats::rpc::RpcReadError;
 use raster::{GeoTransform, Grid, Window};
 
 use super::config::BuildingMapConfig;
@@ -65,7 +65,7 @@ fn place(path: &Path, source: &ImageSource) -> Result<(Place, Option<f64>), Buil
             return Ok((place, metres.map(|metres| metres * (along * across).sqrt())));
         }
     }
-    let rpc = match io::rpc::read_for_image(path) {
+    let rpc = match formats::rpc::read_for_image(path) {
         Ok(read) => read.rpc,
         Err(RpcReadError::NotRpc { .. }) => return Ok((Place::Unknown, None)),
         Err(other) => return Err(other.into()),

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use io::raster::{Band, BandData, CogRaster, write_cog, write_map, write_map_with_rpc};
+use formats::raster::{Band, BandData, CogRaster, write_cog, write_map, write_map_with_rpc};
 use numeric::Progress;
 use raster::{GeoTransform, Grid, NO_DATA};
 

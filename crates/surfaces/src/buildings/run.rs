@@ -58,7 +58,7 @@ fn steps(config: &BuildingMapConfig, progress: &dyn Progress) -> Result<Building
         let report = report(config, &input, &found, &placed.index);
         let lead = format!("{} junctions, {} pairs, at {:.2} m.", report.junctions, report.pairs, report.gsd_m);
         let page = ("Building index", lead.as_str());
-        io::write_bytes(&style, index_legend().qml().as_bytes(), config.overwrite).map_err(FileError::from)?;
+        formats::write_bytes(&style, index_legend().qml().as_bytes(), config.overwrite).map_err(FileError::from)?;
         report_page::write(&report.report, page, &report, layers(&input, &placed.index), config.overwrite)?;
         Ok(report)
     })?

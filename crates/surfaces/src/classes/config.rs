@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use classes::ClassifyConfig;
-use io::raster::BandChoice;
+use formats::raster::BandChoice;
 use serde::{Deserialize, Serialize};
 use terrain::GroundConfig;
 

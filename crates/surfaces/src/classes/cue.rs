@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use classes::ClassifyConfig;
-use io::raster::{Dem, read_dem};
+use formats::raster::{Dem, read_dem};
 use numeric::upper_median;
 use raster::Grid;
 

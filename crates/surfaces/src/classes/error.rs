@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use classes::ClassifyError;
-use io::raster::RasterError;
+use formats::raster::RasterError;
 use numeric::{Cancelled, failures};
 use terrain::TerrainError;
 

@@ -1,7 +1,7 @@
 //! What a surface says of its cells, as far as classes go: which heights were not observed, and
 //! which are rather wrong than right.
 
-use io::raster::Dem;
+use formats::raster::Dem;
 use raster::Grid;
 use serde::Serialize;
 

@@ -9,7 +9,7 @@
 use std::path::{Path, PathBuf};
 
 use classes::{SpectralCells, black_level, nir_gain, vegetation_index};
-use io::raster::{Dem, ImageSource};
+use formats::raster::{Dem, ImageSource};
 use numeric::Progress;
 use raster::Grid;
 use serde::Serialize;

@@ -5,7 +5,7 @@ use classes::{
     classify,
 };
 use crs::Crs;
-use io::raster::{Band, BandData, CogRaster, Dem, read_dem, write_cog};
+use formats::raster::{Band, BandData, CogRaster, Dem, read_dem, write_cog};
 use numeric::Progress;
 use raster::Grid;
 use report::{Legend, LightEnd, MapLayer};

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use change::ChangeError;
 use crs::CrsError;
 use eval::EvalError;
-use io::areas::AreaError;
+use formats::areas::AreaError;
 use numeric::{Cancelled, failures};
 
 use crate::eval::EvalJobError;

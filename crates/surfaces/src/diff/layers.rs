@@ -2,8 +2,8 @@
 
 use change::{Change, volume_of};
 use crs::MapProjection;
+use formats::areas::{AreaFeature, NamedAreas};
 use geo::{Coord, LineString, MapCoords, MultiPolygon, Polygon};
-use io::areas::{AreaFeature, NamedAreas};
 use raster::{GeoTransform, Grid, mark_inside, outlines};
 use serde_json::{Map, Value, json};
 

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use change::{Change, ChangeConfig, ChangeInput, detect, volume_of};
 use crs::{Crs, MapProjection};
-use io::areas::{AreaFeature, NamedAreas};
-use io::raster::{Band, BandData, CogRaster, write_cog};
+use formats::areas::{AreaFeature, NamedAreas};
+use formats::raster::{Band, BandData, CogRaster, write_cog};
 use numeric::Progress;
 use report::{Legend, MapLayer};
 
@@ -73,7 +73,7 @@ fn steps(config: &DiffConfig, progress: &dyn Progress) -> Result<DiffReport, Dif
     let layer = config
         .areas
         .as_ref()
-        .map(|path| io::areas::read_features(path, config.areas_layer.as_deref(), config.areas_field.as_deref()));
+        .map(|path| formats::areas::read_features(path, config.areas_layer.as_deref(), config.areas_field.as_deref()));
     let layer = layer.transpose()?;
     threads::install(config.threads, || {
         let folder = OutputFolder::take(&config.output)?;
@@ -198,8 +198,9 @@ impl Written<'_> {
         put(CHANGE, &[band("change_m", BandData::F32(difference)), band("sigma_m", BandData::F32(sigma))])?;
         put(SIGNIFICANCE, &[band("change_in_sigmas", BandData::F32(&self.change.significance))])?;
         put(REGIONS, &[band("region_number", BandData::U32(&self.change.numbers))])?;
-        let polygons =
-            |path: &Path, features: &[AreaFeature]| io::areas::write(path, features, false).map_err(FileError::from);
+        let polygons = |path: &Path, features: &[AreaFeature]| {
+            formats::areas::write(path, features, false).map_err(FileError::from)
+        };
         polygons(&work.path().join(POLYGONS), self.regions)?;
         if let Some(areas) = self.areas {
             polygons(&work.path().join(AREAS), areas)?;

@@ -4,7 +4,7 @@
 //! right. Other weak cells still show much ground. The standard errors tell how far the ground is
 //! smoothed.
 
-use io::raster::Dem;
+use formats::raster::Dem;
 use raster::Grid;
 use serde::Serialize;
 

@@ -1,7 +1,7 @@
 //! Runs the DTM job.
 
 use crs::{Crs, MapProjection, VerticalDatum};
-use io::raster::{Band, BandData, CogRaster, Dem, read_dem, write_cog};
+use formats::raster::{Band, BandData, CogRaster, Dem, read_dem, write_cog};
 use numeric::Progress;
 use raster::Grid;
 use report::{Legend, LightEnd, MapLayer};

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use crs::{CrsError, VerticalDatum};
-use io::FormatError;
+use formats::FormatError;
 use numeric::{Cancelled, Kind, failures};
 
 use job::error::{FileCrsError, JobError, SettingError, from_steps, job_errors};
@@ -14,7 +14,7 @@ use job::files::FileError;
 pub(crate) enum EvalJobError {
     /// A raster cannot be read.
     #[error(transparent)]
-    Raster(#[from] io::raster::RasterError),
+    Raster(#[from] formats::raster::RasterError),
     /// The coordinate reference system of a file cannot be used.
     #[error(transparent)]
     FileCrs(#[from] FileCrsError),

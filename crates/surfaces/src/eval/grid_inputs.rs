@@ -4,9 +4,9 @@
 //! noted for the report.
 
 use eval::{CellMap, MetresFromCells};
+use formats::points::{CellLattice, PointCloud, is_point_cloud};
+use formats::raster::{Dem, read_dem};
 use geodesy::MapPoint;
-use io::points::{CellLattice, PointCloud, is_point_cloud};
-use io::raster::{Dem, read_dem};
 use raster::Grid;
 
 use super::error::EvalJobError;

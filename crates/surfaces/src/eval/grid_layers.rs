@@ -8,7 +8,7 @@
 use std::path::{Path, PathBuf};
 
 use eval::CellOrigin;
-use io::raster::{Dem, read_dem};
+use formats::raster::{Dem, read_dem};
 use raster::Grid;
 
 use super::error::EvalJobError;

@@ -8,8 +8,8 @@
 use std::path::{Path, PathBuf};
 
 use crs::Crs;
-use io::raster::{Band, BandData, CogRaster, Provenance, write_cog, write_png_rgb, write_world_file};
-use io::write_bytes;
+use formats::raster::{Band, BandData, CogRaster, Provenance, write_cog, write_png_rgb, write_world_file};
+use formats::write_bytes;
 use numeric::Progress;
 use report::{EvaluationReport, Legend, error_picture};
 

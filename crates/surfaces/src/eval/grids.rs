@@ -4,7 +4,7 @@
 use std::path::PathBuf;
 
 use eval::{EvalConfig, EvalInput, Evaluation, MetresFromCells, evaluate};
-use io::raster::Dem;
+use formats::raster::Dem;
 use numeric::Progress;
 use raster::Grid;
 use report::{EvaluationReport, Protocol};

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use eval::{compare_depths, compare_masks, compare_normals};
-use io::maps::MapFile;
+use formats::maps::MapFile;
 use numeric::Progress;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -105,8 +105,8 @@ impl MapEvalConfig {
 ///
 /// let folder = tempfile::tempdir()?;
 /// let (test, reference) = (folder.path().join("test.npy"), folder.path().join("reference.npy"));
-/// io::npy::write(&test, &[1, 2], &[2.5f32, 4.0], false)?;
-/// io::npy::write(&reference, &[1, 2], &[2.0f32, 4.0], false)?;
+/// formats::npy::write(&test, &[1, 2], &[2.5f32, 4.0], false)?;
+/// formats::npy::write(&reference, &[1, 2], &[2.0f32, 4.0], false)?;
 /// let report = compare_maps(&MapEvalConfig::new(test, reference), &Silent)?;
 /// assert_eq!(report.result["errors"]["mae"], 0.25);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -120,7 +120,7 @@ pub fn compare_maps(config: &MapEvalConfig, progress: &dyn Progress) -> Result<M
 }
 
 fn compare(config: &MapEvalConfig) -> Result<MapEvalReport, EvalJobError> {
-    let (test, reference) = (io::maps::read(&config.test)?, io::maps::read(&config.reference)?);
+    let (test, reference) = (formats::maps::read(&config.test)?, formats::maps::read(&config.reference)?);
     let kind = match config.kind {
         Some(kind) => kind,
         None => kind_of(&reference, &config.reference)?,

@@ -52,7 +52,7 @@ pub enum EvalKind {
 
 /// Finds out what two files hold, by their first bytes.
 pub fn detect_kind(test: &Path, reference: &Path) -> EvalKind {
-    if io::maps::is_npy(test) && io::maps::is_npy(reference) {
+    if formats::maps::is_npy(test) && formats::maps::is_npy(reference) {
         EvalKind::Maps
     } else if cityfiles::surfaces::is_surface(test) && cityfiles::surfaces::is_surface(reference) {
         EvalKind::Surfaces

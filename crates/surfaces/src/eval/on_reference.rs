@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crs::{CrsIdentity, MapProjection};
 use eval::{CellMap, bilinear, nearest};
-use io::raster::{Dem, ImageSource};
+use formats::raster::{Dem, ImageSource};
 use raster::{GeoTransform, Grid};
 
 use super::error::EvalJobError;

@@ -2,7 +2,7 @@
 //! heights in another unit.
 
 use eval::Evaluation;
-use io::raster::Dem;
+use formats::raster::Dem;
 use numeric::{order_statistic, upper_nmad};
 use raster::Grid;
 

@@ -8,7 +8,7 @@
 
 use crs::{HeightConverter, VerticalDatum};
 use eval::{AlignmentMethod, MetresFromCells, convert_heights};
-use io::raster::Dem;
+use formats::raster::Dem;
 
 use super::error::EvalJobError;
 use super::on_reference::{definition, metres_per_unit};

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use io::raster::{ImageSource, SampleType, write_png_rgb};
+use formats::raster::{ImageSource, SampleType, write_png_rgb};
 use numeric::Progress;
 use raster::Grid;
 use serde::{Deserialize, Serialize};
@@ -67,9 +67,9 @@ impl ComposeConfig {
 ///
 /// let folder = tempfile::tempdir()?;
 /// let path = |name: &str| folder.path().join(name);
-/// io::raster::write_png_rgb(path("ground.png"), &Grid::filled(2, 2, [100, 0, 0]), false)?;
-/// io::raster::write_png_gray(path("alpha.png"), &Grid::filled(2, 2, 255), false)?;
-/// io::raster::write_png_rgb(path("satellite.png"), &Grid::filled(2, 2, [0, 0, 200]), false)?;
+/// formats::raster::write_png_rgb(path("ground.png"), &Grid::filled(2, 2, [100, 0, 0]), false)?;
+/// formats::raster::write_png_gray(path("alpha.png"), &Grid::filled(2, 2, 255), false)?;
+/// formats::raster::write_png_rgb(path("satellite.png"), &Grid::filled(2, 2, [0, 0, 200]), false)?;
 /// let config = ComposeConfig::new(path("ground.png"), path("alpha.png"), path("satellite.png"), path("both.png"));
 /// assert_eq!(compose(&config, &Silent)?.size, [2, 2]);
 /// # Ok::<(), Box<dyn std::error::Error>>(())

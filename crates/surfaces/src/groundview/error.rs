@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use crs::CrsError;
-use io::FormatError;
+use formats::FormatError;
 use numeric::{Cancelled, Kind, failures};
 
 use crate::camera_stand::StandError;
@@ -90,7 +90,7 @@ pub(crate) enum GroundViewError {
     },
     /// A picture cannot be read.
     #[error(transparent)]
-    Raster(#[from] io::raster::RasterError),
+    Raster(#[from] formats::raster::RasterError),
     /// The layers of a composition have different sizes.
     #[error(transparent)]
     Layers(#[from] groundview::SizeError),

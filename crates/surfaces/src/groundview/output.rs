@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
+use formats::colmap::{ColmapEncoding, ColmapModel, ColmapPoint, ColmapView};
+use formats::raster::{Band, BandData, ImageSource, MapTile, write_map_tile, write_png_rgb};
 use groundview::{GroundView, Panorama, Viewer, render, visible_cells};
-use io::colmap::{ColmapEncoding, ColmapModel, ColmapPoint, ColmapView};
-use io::raster::{Band, BandData, ImageSource, MapTile, write_map_tile, write_png_rgb};
 use numeric::Progress;
 use raster::Grid;
 
@@ -127,7 +127,7 @@ impl Made {
         let origin = surface.local_origin();
         if !self.model.views.is_empty() {
             let sparse = folder.join("sparse/0");
-            io::colmap::write(&sparse, &self.model, &self.points, ColmapEncoding::Binary, overwrite)
+            formats::colmap::write(&sparse, &self.model, &self.points, ColmapEncoding::Binary, overwrite)
                 .map_err(FileError::from)?;
             origin.write(&sparse.join("origin.json"), overwrite).map_err(FileError::from)?;
         }

@@ -4,8 +4,8 @@ use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use camera::{Lens, Pose};
+use formats::positions::read_positions;
 use groundview::{Panorama, level_pose};
-use io::positions::read_positions;
 
 use super::config::{GroundCameras, GroundViewConfig};
 use super::error::GroundViewError;

@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use camera::ImagePoint;
+use formats::colmap::{ColmapObservation, ColmapPoint};
+use formats::npy;
+use formats::raster::{write_png_gray, write_png_rgb};
 use groundview::{GROUND, GroundView, SKY, Viewer};
-use io::colmap::{ColmapObservation, ColmapPoint};
-use io::npy;
-use io::raster::{write_png_gray, write_png_rgb};
 use raster::Grid;
 use report::{depth_preview, normal_preview, side_by_side};
 

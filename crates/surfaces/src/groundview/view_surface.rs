@@ -6,8 +6,8 @@ use std::path::Path;
 use bvh::Ray;
 use city::MeshConfig;
 use crs::{CrsIdentity, HeightConverter, MapProjection, VerticalDatum};
+use formats::splat_ply::LocalOrigin;
 use groundview::{Ground, HeightField, MeshGround, Met};
-use io::splat_ply::LocalOrigin;
 use numeric::Progress;
 use raster::{GeoTransform, Grid};
 

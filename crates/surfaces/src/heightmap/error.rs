@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use crs::CrsError;
+use formats::FormatError;
 use heightmap::HeightMapError;
-use io::FormatError;
 use numeric::{Cancelled, Kind, failures};
 
 use crate::camera_stand::StandError;
@@ -20,7 +20,7 @@ pub(crate) enum HeightMapJobError {
     Stand(#[from] StandError),
     /// A raster cannot be read.
     #[error(transparent)]
-    Raster(#[from] io::raster::RasterError),
+    Raster(#[from] formats::raster::RasterError),
     /// The city model cannot serve as surface.
     #[error(transparent)]
     City(#[from] CitySurfaceError),

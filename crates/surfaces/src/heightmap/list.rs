@@ -7,7 +7,7 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use io::positions::{PositionRow, read_positions};
+use formats::positions::{PositionRow, read_positions};
 use numeric::Progress;
 use rayon::prelude::*;
 

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
+use formats::raster::{Band, BandData, BandScale, MapTile, write_map_tile, write_png_rgb, write_world_file};
 use heightmap::{GROUND_REACH_M, HeightMapError, Reading, ground_height, mean_distance_m};
-use io::raster::{Band, BandData, BandScale, MapTile, write_map_tile, write_png_rgb, write_world_file};
 use numeric::Progress;
 use raster::{Grid, Light};
 

@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use crs::VerticalDatum;
+use formats::raster::{ImageSource, read_dem, read_dem_window};
 use heightmap::{
     MapSystem, Reading, SourceMap, TileFrame, TileMap, TileRequest, confidence_from_grid, heights_from_grid,
 };
-use io::raster::{ImageSource, read_dem, read_dem_window};
 use numeric::Progress;
 use raster::{GeoTransform, Grid, Window};
 
@@ -134,7 +134,7 @@ impl RasterSource {
     fn window(&self, window: Window) -> Result<Option<(Grid<f32>, GeoTransform)>, HeightMapJobError> {
         match read_dem_window(&self.path, window) {
             Ok(part) => Ok(Some((part.heights, part.geotransform))),
-            Err(io::raster::RasterError::Unsupported { .. }) => Ok(None),
+            Err(formats::raster::RasterError::Unsupported { .. }) => Ok(None),
             Err(error) => Err(error.into()),
         }
     }

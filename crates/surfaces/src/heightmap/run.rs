@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use io::raster::ImageSource;
+use formats::raster::ImageSource;
 use numeric::Progress;
 use report::{Legend, LightEnd, MapLayer};
 

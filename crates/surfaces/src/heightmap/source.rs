@@ -1,7 +1,7 @@
 //! Sources of heights: rasters, city models and point clouds, each read at the pixels of a tile.
 
+use formats::points::is_point_cloud;
 use heightmap::{MapSystem, TileRequest};
-use io::points::is_point_cloud;
 use numeric::Progress;
 use rayon::prelude::*;
 

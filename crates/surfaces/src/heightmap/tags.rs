@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use io::raster::ImageSource;
+use formats::raster::ImageSource;
 use serde::Serialize;
 
 use super::error::HeightMapJobError;

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
+use formats::raster::{Band, BandData, BandScale, MapTile, write_map_tile};
 use heightmap::TileFrame;
-use io::raster::{Band, BandData, BandScale, MapTile, write_map_tile};
 use numeric::Progress;
 
 use super::config::HeightMapConfig;

@@ -3,12 +3,12 @@
 use std::path::Path;
 
 use crs::{Crs, MapProjection};
+use formats::ply::{PlyPoint, write_points};
+use formats::points::write_las;
+use formats::raster::{ImageSource, SampleType};
+use formats::splat_ply::{LocalOrigin, SplatForm, SplatLayout};
 use geodesy::{LonLatHeight, TransverseMercator, utm_epsg};
 use heightmap::{camera_points, map_points};
-use io::ply::{PlyPoint, write_points};
-use io::points::write_las;
-use io::raster::{ImageSource, SampleType};
-use io::splat_ply::{LocalOrigin, SplatForm, SplatLayout};
 use numeric::Progress;
 use raster::{GeoTransform, Grid};
 use splats::{DivisionConfig, SplatSurface, picture_splats, stretched};
@@ -161,7 +161,8 @@ impl HeightMapFile {
         let splats = picture_splats(&surface, picture.as_ref(), self.confidence.as_ref(), merged)?;
         let origin = LocalOrigin::new(self.projection.definition(), "ellipsoid", [camera.x, camera.y, camera_height_m]);
         let layout = SplatLayout { form: SplatForm::Ellipsoids, sh_degree: 0 };
-        io::splat_ply::write(&config.output, &splats, &origin, layout, config.overwrite).map_err(FileError::from)?;
+        formats::splat_ply::write(&config.output, &splats, &origin, layout, config.overwrite)
+            .map_err(FileError::from)?;
         Ok(splats.len())
     }
 

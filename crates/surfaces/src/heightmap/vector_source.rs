@@ -5,11 +5,11 @@ use std::path::PathBuf;
 use bvh::Bvh;
 use city::{LodChoice, MeshConfig, Scope};
 use crs::{CrsIdentity, VerticalDatum};
+use formats::points::PointCloud;
 use heightmap::{
     GROUND_REACH_M, HighestPoints, MapSystem, PlacedTriangles, PointTiles, SourceMap, TileFrame, TileMap, TileRequest,
     heights_from_triangles, lowest_from_triangles,
 };
-use io::points::PointCloud;
 use numeric::Progress;
 
 use super::config::HeightMapConfig;

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use crs::CrsError;
-use io::raster::RasterError;
-use io::rpc::RpcReadError;
+use formats::raster::RasterError;
+use formats::rpc::RpcReadError;
 use numeric::{Cancelled, failures};
 
 use job::error::{JobError, SettingError, from_steps, job_errors};

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use camera::{ImageCorrection, RpcCamera};
 use crs::{HeightConverter, MapProjection, VerticalDatum};
-use io::raster::{Dem, ImageSource, RasterError, read_dem};
+use formats::raster::{Dem, ImageSource, RasterError, read_dem};
 use occlusion::{Eyeline, GridGround};
 use raster::{GeoTransform, Grid, Window};
 

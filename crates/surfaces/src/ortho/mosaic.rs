@@ -1,7 +1,7 @@
 //! Makes the ortho block by block: each cell comes from the image that sees it most steeply.
 
+use formats::raster::Dem;
 use geodesy::LonLatHeight;
-use io::raster::Dem;
 use numeric::Progress;
 use occlusion::OcclusionSurface;
 use ortho::{Balance, MosaicRule, Pair, Sight, balance, best_view, feather_weight, median_value};

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use io::raster::{Band, BandData, CogRaster, ImageSource, LumaRule, Provenance, SampleType, iso_time, write_cog};
+use formats::raster::{Band, BandData, CogRaster, ImageSource, LumaRule, Provenance, SampleType, iso_time, write_cog};
 use ortho::Balance;
 use raster::Grid;
 use report::{Legend, LightEnd, MapLayer};
@@ -82,7 +82,7 @@ pub(super) fn write(
     let raster = CogRaster { threads, holds_heights: false, provenance: Some(&provenance), ..plain };
     write_cog(&mask, &raster, config.overwrite).map_err(FileError::from)?;
     let style = state_legend().qml();
-    io::write_bytes(config.mask_style(), style.as_bytes(), config.overwrite).map_err(FileError::from)?;
+    formats::write_bytes(config.mask_style(), style.as_bytes(), config.overwrite).map_err(FileError::from)?;
     let colours = colours(inputs);
     let mut names: Vec<String> = (1..=made.bands.len()).map(|band| format!("band_{band}")).collect();
     names.extend(colours.map(|_| "alpha".to_owned()));
@@ -137,7 +137,7 @@ impl OrthoWriter<'_> {
         let raster = CogRaster {
             no_data: self.colours.is_none().then_some(f64::from(no_data)),
             threads: self.threads,
-            overviews: io::raster::Sampling::Average,
+            overviews: formats::raster::Sampling::Average,
             holds_heights: false,
             colours: self.colours,
             alpha: self.colours.map(|_| bands.len()),

@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use camera::CameraError;
 use crs::CrsError;
-use io::FormatError;
-use io::raster::RasterError;
-use io::rpc::RpcReadError;
+use formats::FormatError;
+use formats::raster::RasterError;
+use formats::rpc::RpcReadError;
 use numeric::{Cancelled, failures};
 
 use crate::ortho::OrthoError;

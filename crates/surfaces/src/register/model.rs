@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use camera::{ImageCorrection, RpcCamera};
 use crs::MapProjection;
+use formats::raster::{Dem, ImageSource};
 use geodesy::LonLatHeight;
-use io::raster::{Dem, ImageSource};
 use numeric::Progress;
 use occlusion::{Eyeline, GridGround};
 use raster::{GeoTransform, Grid};
@@ -108,8 +108,9 @@ impl Model {
     }
 
     fn of_splats(path: &Path, image: &Path, camera: &RpcCamera) -> Result<Self, RegisterError> {
-        let file = io::splat_files::read(path)?;
-        let origin = file.origin.ok_or_else(|| RegisterError::NoOrigin { path: io::splat_ply::origin_path(path) })?;
+        let file = formats::splat_files::read(path)?;
+        let origin =
+            file.origin.ok_or_else(|| RegisterError::NoOrigin { path: formats::splat_ply::origin_path(path) })?;
         if origin.vertical != "ellipsoid" {
             return Err(RegisterError::Datum { vertical: origin.vertical, path: path.to_owned() });
         }

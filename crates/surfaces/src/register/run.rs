@@ -64,7 +64,7 @@ fn steps(config: &RegisterConfig, progress: &dyn Progress) -> Result<RegisterRep
 }
 
 fn register(config: &RegisterConfig, progress: &dyn Progress) -> Result<RegisterReport, RegisterError> {
-    let rpc = io::rpc::read_for_image(&config.image)?.rpc;
+    let rpc = formats::rpc::read_for_image(&config.image)?.rpc;
     let camera = RpcCamera { rpc, correction: ImageCorrection::IDENTITY };
     let model = Model::open(config, &camera, progress)?;
     let mut new = open(config, &model, camera)?;

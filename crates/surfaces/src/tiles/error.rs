@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
-use io::FormatError;
-use io::raster::RasterError;
-use io::rpc::RpcReadError;
+use formats::FormatError;
+use formats::raster::RasterError;
+use formats::rpc::RpcReadError;
 use numeric::{Cancelled, Kind, failures};
 
 use crate::camera_stand::StandError;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use io::raster::{ImageSource, LumaRule, RasterError, write_png_rgb, write_world_file};
+use formats::raster::{ImageSource, LumaRule, RasterError, write_png_rgb, write_world_file};
 use raster::Grid;
 use report::MapLayer;
 

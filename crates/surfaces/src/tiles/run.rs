@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use formats::positions::read_positions;
 use geodesy::{EnuFrame, LonLatHeight};
-use io::positions::read_positions;
 use numeric::Progress;
 use raster::Window;
 

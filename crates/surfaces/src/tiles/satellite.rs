@@ -4,8 +4,8 @@
 use std::path::PathBuf;
 
 use camera::{RpcCamera, ViewDirection};
+use formats::raster::ImageSource;
 use geodesy::LonLatHeight;
-use io::raster::ImageSource;
 use numeric::Progress;
 
 use super::error::TilesError;
