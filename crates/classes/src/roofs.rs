@@ -41,6 +41,10 @@ impl RoofScene<'_> {
         (length_m / self.cell_m).round().max(1.0) as usize
     }
 
+    fn stands(&self) -> Grid<bool> {
+        self.above_ground.map(|h| *h > self.least_m)
+    }
+
     /// Returns the planes of what rises above the ground.
     pub(crate) fn planes(&self) -> Planes {
         let lowest_m = LOWEST_ROOF_SHARE * self.least_m;
@@ -59,8 +63,7 @@ impl RoofScene<'_> {
         least_residual_m: f64,
     ) {
         let around = (self.steps(0.5 * AROUND_M), self.cell_m);
-        let stands = self.above_ground.map(|h| *h > self.least_m);
-        let flat = flatness(planes, roughness, &stands, around, least_residual_m);
+        let flat = flatness(planes, roughness, &self.stands(), around, least_residual_m);
         let least = (PLANE_OF_SPHERE * least_radius_m) as f32;
         mask.data_mut().iter_mut().zip(flat.data()).for_each(|(is, flat)| *is &= *flat >= least);
     }
@@ -113,11 +116,12 @@ impl RoofScene<'_> {
     /// half is `known` by other evidence than heights stay.
     pub(crate) fn without_slopes(&self, mask: &mut Grid<bool>, known: &[bool]) {
         let (numbers, regions) = labelled(mask);
+        let stands = self.stands();
         for cells in regions {
             if 2 * cells.iter().filter(|at| known[**at]).count() > cells.len() {
                 continue;
             }
-            if !has_walls(self.surface, &numbers, &cells, self.cell_m, WALL_SHARE * self.least_m) {
+            if !has_walls(self.surface, &stands, &numbers, &cells, self.cell_m, WALL_SHARE * self.least_m) {
                 cells.into_iter().for_each(|at| mask.data_mut()[at] = false);
             }
         }

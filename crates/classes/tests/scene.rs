@@ -74,6 +74,22 @@ fn houses_and_trees_are_told_apart() {
 }
 
 #[test]
+fn a_roof_that_the_raster_cuts_and_that_clutter_surrounds_is_a_building() {
+    // A hall with machines along its rims: the smooth part of the roof ends at them, not at walls.
+    let mut heights = Grid::filled(200, 100, 0.0f32);
+    let mut stream = SplitMix64::new(1);
+    for row in 60..100 {
+        for column in 40..160 {
+            let is_rim = row < 72 || !(52..148).contains(&column);
+            heights[(column, row)] = 12.0 + if is_rim { 1.5 * stream.uniform() as f32 } else { 0.0 };
+        }
+    }
+    let found = classify(&heights_alone(&heights), &ClassifyConfig::default()).unwrap().classes;
+    let smooth = (76..100).flat_map(|row| (56..144).map(move |column| (column, row)));
+    assert!(smooth.into_iter().all(|at| found[at] == BUILDING));
+}
+
+#[test]
 fn a_vegetation_index_overrules_the_roughness() {
     let (mut heights, mut index) = (Grid::filled(60, 60, 0.0f32), Grid::filled(60, 60, 0.0f32));
     for row in 10..40 {
