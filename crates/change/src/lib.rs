@@ -6,7 +6,7 @@
 //!
 //! 1. The **difference** after − before, and its standard deviation from those of the surfaces.
 //! 2. **Calibration**: the standardised differences of a scene that has mostly not changed must
-//!    have a spread of 1. What they have more is a factor on all deviations.
+//!    have a spread of at most 1. A larger one is a factor on all deviations.
 //! 3. **Correlation**: how alike the errors of two cells are, by their distance, measured on the
 //!    cells that do not stand out. The deviation of a regional mean follows from it, as in Hugonnet
 //!    et al. (2022, <https://doi.org/10.1109/JSTARS.2022.3188922>).

@@ -61,7 +61,8 @@ pub struct DiffReport {
     /// What blocks were moved by besides, if that was asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub blocks: Option<DiffBlocks>,
-    /// Factor that the stated deviations needed to explain the differences of unchanged ground.
+    /// Factor, at least 1, that the stated deviations needed to explain the differences of
+    /// unchanged ground; without stated deviations the deviation that was measured, metres.
     pub sigma_factor: f64,
     /// Median level of detection of a cell at the confidence, metres.
     pub detection_m: f64,
