@@ -165,14 +165,7 @@ pub fn classify(input: &ClassifyInput<'_>, config: &ClassifyConfig) -> Result<Cl
     config.validate()?;
     check(input)?;
     let least_m = config.least_height_m as f32;
-    let stands = input.above_ground.map(|h| *h > least_m);
     let scale = Scale::of(input, config);
-    let roughness = least_residual(input.surface, &stands, reach_of(scale.window_m, input.cell_m));
-    let limit_m = scale.roughness_m as f32;
-    let cells = |area_m2: f64| (area_m2 / (input.cell_m * input.cell_m)).ceil() as usize;
-    let steps = |length_m: f64| (length_m / input.cell_m).round().max(1.0) as usize;
-    let green = Greenness::of(input, config);
-    let mut buildings = roughness.map(|r| *r < limit_m);
     let scene = RoofScene {
         surface: input.surface,
         above_ground: input.above_ground,
@@ -181,10 +174,16 @@ pub fn classify(input: &ClassifyInput<'_>, config: &ClassifyConfig) -> Result<Cl
         least_m,
         tolerance_m: scale.tolerance_m,
     };
+    let mut stands = scene.stands();
+    let roughness = least_residual(input.surface, &stands, reach_of(scale.window_m, input.cell_m));
+    let limit_m = scale.roughness_m as f32;
+    let cells = |area_m2: f64| (area_m2 / (input.cell_m * input.cell_m)).ceil() as usize;
+    let steps = |length_m: f64| (length_m / input.cell_m).round().max(1.0) as usize;
+    let green = Greenness::of(input, config);
+    let mut buildings = roughness.map(|r| *r < limit_m);
     let planes = scene.planes();
     scene.without_crowns(&mut buildings, (&planes, &roughness), scale.radius_m, config.least_roughness_m);
     clear(&mut buildings, &green.tall);
-    let mut stands = stands;
     let mut likely = vec![false; stands.data().len()];
     if let Some(cue) = &input.cue {
         likely = likely_buildings(input, cue, (&roughness, scale.roughness_m), config);

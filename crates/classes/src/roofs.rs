@@ -41,7 +41,8 @@ impl RoofScene<'_> {
         (length_m / self.cell_m).round().max(1.0) as usize
     }
 
-    fn stands(&self) -> Grid<bool> {
+    /// Returns the cells that rise above the ground by more than the least height.
+    pub(crate) fn stands(&self) -> Grid<bool> {
         self.above_ground.map(|h| *h > self.least_m)
     }
 

@@ -35,28 +35,25 @@ pub(crate) fn has_walls(
     let number = numbers.data()[first];
     let at = |x: i64, y: i64| {
         let place = (usize::try_from(x).ok()?, usize::try_from(y).ok()?);
-        Some((*numbers.get(place.0, place.1)? == number, surface[place]))
+        Some((*numbers.get(place.0, place.1)? == number, surface[place], stands[place]))
     };
     let (mut walls, mut seen) = ([0usize; 4], [0usize; 4]);
     for &cell in cells {
         let (x, y) = ((cell % width) as i64, (cell / width) as i64);
         for (side, (dx, dy)) in [(1, 0), (-1, 0), (0, 1), (0, -1)].into_iter().enumerate() {
-            let out = (1..=outside).map_while(|k| at(x + k * dx, y + k * dy).filter(|(is_own, _)| !is_own));
-            let low = out.map(|(_, height)| height).fold(f32::NAN, f32::min);
+            let out = (1..=outside).map_while(|k| at(x + k * dx, y + k * dy).filter(|(is_own, ..)| !is_own));
+            let low = out.map(|(_, height, _)| height).fold(f32::NAN, f32::min);
             if low.is_nan() {
                 continue;
             }
-            let own = (0..=inside).map_while(|k| at(x - k * dx, y - k * dy).filter(|(is_own, _)| *is_own));
-            let drop = own.map(|(_, height)| height).fold(f32::NAN, f32::max) - low;
+            let own = (0..=inside).map_while(|k| at(x - k * dx, y - k * dy).filter(|(is_own, ..)| *is_own));
+            let drop = own.map(|(_, height, _)| height).fold(f32::NAN, f32::max) - low;
             // The surface further out and further in tells how much of the drop is its slope.
-            let height = |k: i64| at(x + k * dx, y + k * dy).map_or(f32::NAN, |(_, height)| height);
+            let height = |k: i64| at(x + k * dx, y + k * dy).map_or(f32::NAN, |(_, height, _)| height);
             let (within, beyond) = (height(-inside - outside) - height(-inside), height(outside) - height(2 * outside));
             let slope = within.min(beyond).max(0.0) / outside as f32;
             let is_wall = drop - slope * (inside + outside) as f32 >= least_m;
-            let is_standing = |k: i64| {
-                let place = usize::try_from(x + k * dx).ok().zip(usize::try_from(y + k * dy).ok());
-                place.and_then(|(x, y)| stands.get(x, y)).is_some_and(|stands| *stands)
-            };
+            let is_standing = |k: i64| at(x + k * dx, y + k * dy).is_some_and(|(.., stands)| stands);
             let is_hidden = slope < LEVEL * cell_m as f32 && (1..=outside).all(is_standing);
             if is_wall || !is_hidden {
                 seen[side] += 1;
