@@ -76,10 +76,10 @@ test: setup ## unit, property, integration and documentation tests, and those of
 	wait "$$ENVIRONMENT" || true
 	crates/python/tests/run.sh
 
-quick: check ## before a commit: format, clippy, rules of the code and of the pages, unit tests of the crates that differ from BASE (HEAD~1)
+quick: check ## before a commit: format, clippy, rules of code and pages, Python's functions, unit tests of the crates that differ from BASE (HEAD~1)
 	@cargo fmt --all --check
 	cargo clippy --workspace --lib --bins -- -D warnings
-	cargo test --quiet --test architecture --test documents
+	cargo test --quiet -p skysweep -p skysweep-python --test architecture --test documents --test signatures
 	BASE=$${BASE:-$$(git rev-parse --quiet --verify HEAD~1 || echo HEAD)}
 	CHANGED=$$({ git diff --name-only "$$BASE"; git ls-files --others --exclude-standard; } |
 	  sed -nE 's|^crates/([a-z]+)/.*|\1|p' | sort -u)

@@ -1258,7 +1258,8 @@ class DiffReport(Report):
     """What blocks were moved by besides, if that was asked for."""
 
     sigma_factor: float
-    """Factor that the stated deviations needed to explain the differences of unchanged ground."""
+    """Factor, at least 1, that the stated deviations needed to explain the differences of
+    unchanged ground; without stated deviations the deviation that was measured, metres."""
 
     detection_m: float
     """Median level of detection of a cell at the confidence, metres."""
