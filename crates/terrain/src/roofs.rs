@@ -25,6 +25,9 @@ const GROUND_SHARE: f32 = 0.05;
 /// Least share of heights more than a storey below such a ground: those of the streets, and of the
 /// lower houses. Wrong heights below real ground were 2 % of a surface at most.
 const BENEATH_SHARE: f32 = 0.05;
+/// Share of heights within a storey of a ground from which on they are that ground: roofs of a
+/// quarter differ by more than two storeys.
+const AT_SHARE: f32 = 0.5;
 /// Side of the smallest quarter of which only roofs are known, metres: some houses with the streets
 /// between them. A single tower and what it hides are smaller.
 const QUARTER_M: f64 = 100.0;
@@ -35,8 +38,9 @@ const EVEN_M: f32 = 0.4;
 /// Returns where the ground that was found in a surface with cells of `cell_m` metres goes through
 /// roofs. It does so in parts of which a third is void, and where it lies more than a storey above
 /// `lower`, a trend under the lowest heights around. Some heights of such a part lie more than a
-/// storey below this ground, and more of them lie that far over it. Some must lie at the trend, and
-/// all must be as even as roofs are: between crowns there are crowns.
+/// storey below this ground, more of them lie that far over it, and less than half within a storey
+/// of it. Some must lie at the trend, and all must be as even as roofs are: between crowns there
+/// are crowns.
 ///
 /// All three are in metres. Voids of the surface, and places without ground, are NaN.
 ///
@@ -70,6 +74,7 @@ pub fn goes_through_roofs(ground: &Grid<f32>, surface: &Grid<f32>, lower: &Grid<
         part.known < 1.0 - VOID_SHARE
             && part.beneath > BENEATH_SHARE * part.known
             && part.beneath < part.over
+            && part.at < AT_SHARE * part.known
             && part.is_even
     })
 }
@@ -239,6 +244,28 @@ mod tests {
         }
         let low = slope.map(|h| h - 8.0);
         assert!(!goes_through_roofs(&slope, &surface, &low, 1.0).data().contains(&true));
+    }
+
+    #[test]
+    fn a_ground_at_which_most_heights_lie_goes_through_no_roofs() {
+        let is_through = |is_ground_seen: bool| {
+            let (slope, mut surface) =
+                quarter(
+                    |ground_m| if is_ground_seen && (5.0 * ground_m) as usize % 2 == 0 { ground_m } else { f32::NAN },
+                );
+            // Every second house is void, and in one square in four the ground is too low.
+            for (i, height) in surface.data_mut().iter_mut().enumerate() {
+                let (squares, ground_m) = (i % 180 / 14 + i / 180 / 14, slope.data()[i]);
+                match *height > ground_m {
+                    true if squares % 2 == 1 => *height = f32::NAN,
+                    false if squares % 4 == 0 => *height -= 8.0,
+                    _ => {}
+                }
+            }
+            let low = slope.map(|h| h - 8.0);
+            goes_through_roofs(&slope, &surface, &low, 1.0).data().contains(&true)
+        };
+        assert!(is_through(false) && !is_through(true));
     }
 
     /// Houses in the north, crowns in the south, and a void of 70 m between. Blocks hold whole
