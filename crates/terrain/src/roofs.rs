@@ -48,10 +48,10 @@ const EVEN_M: f32 = 0.4;
 /// use raster::Grid;
 /// use terrain::goes_through_roofs;
 ///
-/// // Roofs of 9, 13 and 17 m, with a void between each two of them, and a street.
+/// // Roofs of 9, 15 and 21 m, with a void between each two of them, and a street.
 /// let roof = |i: usize| match i % 90 {
 ///     20..30 => 1.0,
-///     column if column % 10 < 6 => 9.0 + 4.0 * (column / 10 % 3) as f32,
+///     column if column % 10 < 6 => 9.0 + 6.0 * (column / 10 % 3) as f32,
 ///     _ => f32::NAN,
 /// };
 /// let roofs = Grid::from_vec(90, 90, (0..8100).map(roof).collect()).unwrap();
