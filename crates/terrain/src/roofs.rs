@@ -249,10 +249,8 @@ mod tests {
     #[test]
     fn a_ground_at_which_most_heights_lie_goes_through_no_roofs() {
         let is_through = |is_ground_seen: bool| {
-            let (slope, mut surface) =
-                quarter(
-                    |ground_m| if is_ground_seen && (5.0 * ground_m) as usize % 2 == 0 { ground_m } else { f32::NAN },
-                );
+            let is_seen = |ground_m: f32| is_ground_seen && ((5.0 * ground_m) as usize).is_multiple_of(2);
+            let (slope, mut surface) = quarter(|ground_m| if is_seen(ground_m) { ground_m } else { f32::NAN });
             // Every second house is void, and in one square in four the ground is too low.
             for (i, height) in surface.data_mut().iter_mut().enumerate() {
                 let (squares, ground_m) = (i % 180 / 14 + i / 180 / 14, slope.data()[i]);
