@@ -25,8 +25,8 @@ const GROUND_SHARE: f32 = 0.05;
 /// Least share of heights more than a storey below such a ground: those of the streets, and of the
 /// lower houses. Wrong heights below real ground were 2 % of a surface at most.
 const BENEATH_SHARE: f32 = 0.05;
-/// Share of heights within a storey of a ground from which on they are that ground: roofs of a
-/// quarter differ by more than two storeys.
+/// Greatest share of heights within a storey of such a ground: roofs of a quarter differ by more
+/// than two storeys, and most heights lie at real ground that is seen.
 const AT_SHARE: f32 = 0.5;
 /// Side of the smallest quarter of which only roofs are known, metres: some houses with the streets
 /// between them. A single tower and what it hides are smaller.
