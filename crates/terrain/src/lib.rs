@@ -49,6 +49,7 @@ mod roofs;
 mod runs;
 mod smooth;
 mod stray;
+mod support;
 mod trend;
 
 pub use config::GroundConfig;
@@ -57,5 +58,6 @@ pub use ground::{
     BareGround, GROUND, UNDER_OBJECT, UNKNOWN, VOID_FILLED, bare_ground, bare_ground_by_openings,
     bare_ground_of_observed,
 };
-pub use roofs::{goes_through_roofs, shows_hardly_but_roofs};
+pub use roofs::shows_hardly_but_roofs;
 pub use smooth::without_noise;
+pub use support::supported_ground;

@@ -10,8 +10,8 @@ use sweep::fusion::{
     fill_voids, ground_trend, occlusion_bounds, remove_speckle, surroundings,
 };
 use terrain::{
-    BareGround, GroundConfig, TerrainError, bare_ground_by_openings, bare_ground_of_observed, goes_through_roofs,
-    shows_hardly_but_roofs,
+    BareGround, GroundConfig, TerrainError, bare_ground_by_openings, bare_ground_of_observed, shows_hardly_but_roofs,
+    supported_ground,
 };
 
 use crate::surface::fill::Fill;
@@ -121,6 +121,7 @@ pub(crate) fn clean_up(
     let trust = TrustModel::new(fused, config);
     let completed = take_unseen(fused);
     let before = known(&fused.height_m, core);
+    let all_m = fused.height_m.clone();
     drop_weak(fused, &trust, gsd_m);
     let right = trust.probability(fused);
     drop_hidden(&mut fused.height_m, &right, voids.sights, tolerance_m as f32);
@@ -139,7 +140,7 @@ pub(crate) fn clean_up(
     let (mut above_m, completed) = (above(&fused.height_m), above(&completed));
     let (ground_m, only_roofs) = match voids.fill {
         Fill::None => (trusted.map(|_| f32::NAN), trusted.map(|_| false)),
-        _ => ground_under(&fused.height_m, &trusted, &trend, gsd_m),
+        _ => ground_under(&fused.height_m, &all_m, &trusted, gsd_m),
     };
     let ground = above(&ground_m);
     let known = KnownVoids {
@@ -165,7 +166,7 @@ pub(crate) fn clean_up(
 ///
 /// The ground tells how low a void may be. Voids are filled relative to the trend all the same:
 /// that is even, and the ground repeats the noise of the heights that it goes through.
-fn ground_under(height_m: &Grid<f32>, trusted: &Grid<bool>, trend: &Grid<f32>, gsd_m: f64) -> (Grid<f32>, Grid<bool>) {
+fn ground_under(height_m: &Grid<f32>, all_m: &Grid<f32>, trusted: &Grid<bool>, gsd_m: f64) -> (Grid<f32>, Grid<bool>) {
     let seen = height_m.without(|i| !trusted.data()[i]);
     let unobserved = seen.map(|h| h.is_nan());
     let config = GroundConfig::default();
@@ -177,10 +178,8 @@ fn ground_under(height_m: &Grid<f32>, trusted: &Grid<bool>, trend: &Grid<f32>, g
         || heights(bare_ground_of_observed(&seen, Some(&unobserved), gsd_m, &config, &Silent)),
         || heights(bare_ground_by_openings(&seen, &unobserved, gsd_m, &config, &Silent)),
     );
-    let mut ground_m = by_planes_m.zip_map(&by_openings_m, |a, b| a.min(*b));
-    let is_through = goes_through_roofs(&by_planes_m, height_m, trend, gsd_m);
-    let cells = ground_m.data_mut().iter_mut().zip(trend.data()).zip(is_through.data());
-    cells.filter(|(_, is_through)| **is_through).for_each(|((ground_m, trend_m), _)| *ground_m = *trend_m);
+    let ground_m = by_planes_m.zip_map(&by_openings_m, |a, b| a.min(*b));
+    let ground_m = supported_ground(all_m, &ground_m, gsd_m);
     let only_roofs = shows_hardly_but_roofs(height_m, &ground_m, gsd_m);
     (ground_m, only_roofs)
 }
