@@ -1,6 +1,6 @@
 //! The bare ground under the buildings and trees of a surface model.
 //!
-//! The method has six parts, all in metres and slopes:
+//! The method has seven parts, all in metres and slopes:
 //!
 //! 1. **Pits**, **islands** and **forests** are set aside: places below the ground around them, a
 //!    few observed cells between unobserved ones, and wide areas of rough cells between which no
@@ -26,6 +26,8 @@
 //!    known beside clearings, or by gaps that reach down to the ground.
 //! 6. Where the surface says how uncertain its heights are, the ground is **smoothed** as far as
 //!    they are: [`without_noise`].
+//! 7. Among dense houses the ground is the one that most heights **support**, with few beneath it:
+//!    [`supported_ground`].
 //!
 //! Heights are in metres above any datum, NaN is a void. The work is done on cells of about a metre
 //! and takes memory in proportion to the cells.
@@ -58,6 +60,6 @@ pub use ground::{
     BareGround, GROUND, UNDER_OBJECT, UNKNOWN, VOID_FILLED, bare_ground, bare_ground_by_openings,
     bare_ground_of_observed,
 };
-pub use roofs::shows_hardly_but_roofs;
+pub use roofs::{goes_through_roofs, shows_hardly_but_roofs};
 pub use smooth::without_noise;
 pub use support::supported_ground;

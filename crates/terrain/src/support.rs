@@ -43,20 +43,21 @@ const LEVELS_NEAR: usize = 3;
 /// Share of the known heights that gives half of the full score: a few of them may lie at a level
 /// by chance.
 const CHANCE_SHARE: f32 = 0.02;
-/// Cost of a change by one metre between neighbouring nodes, in scores: ground that turns by the
-/// tenth of a metre per metre pays as much as a sixth of the best score.
-const COST_PER_M: f64 = 0.16;
+/// Cost of a change by one metre between neighbouring nodes, in scores. To follow a block of houses
+/// 10 m up and down costs six, as much as they could gain on a width of some 70 m.
+const COST_PER_M: f64 = 0.3;
 /// Standard deviation over which the support of two grounds is compared, metres: a few houses.
 const COMPARED_M: f64 = 20.0;
 /// Least gain in score with which another ground takes the place of the given one.
-const GAIN_MIN: f32 = 0.05;
+const GAIN_MIN: f32 = 0.1;
 /// Least share of heights at such a ground: a third of what the streets of dense quarters had.
 const SHARE_MIN: f32 = 0.03;
 
-/// Returns the ground under a surface with cells of `cell_m` metres: where much more heights support
-/// another one than the given `ground`, the other one, elsewhere the given one.
+/// Returns the ground under a surface with cells of `cell_m` metres: where clearly more heights
+/// support a lower one than the given `ground`, the lower one, elsewhere what is given by
+/// `otherwise`, which may be the same ground.
 ///
-/// Both are in metres. Voids of the surface, and places without ground, are NaN. All heights of the
+/// All are in metres. Voids of the surface, and places without ground, are NaN. All heights of the
 /// surface count, so that weak ones should be left in it.
 ///
 /// ```
@@ -64,30 +65,34 @@ const SHARE_MIN: f32 = 0.03;
 /// use terrain::supported_ground;
 ///
 /// // Roofs of 6 to 20 m with voids between them; every third street is known in every third part.
-/// let height = |column: usize, row: usize| match (column % 15 < 9 && row % 15 < 9, column / 15, row / 15) {
-///     (true, x, y) => 6.0 + ((7 * x + 5 * y) % 15) as f32,
-///     (false, x, y) if (x + y) % 3 == 0 && (column + row) % 3 == 0 => 0.0,
+/// let height = |column: usize, row: usize| match (column / 15, row / 15) {
+///     (x, y) if column % 15 < 9 && row % 15 < 9 => 6.0 + ((7 * x + 5 * y) % 15) as f32,
+///     (x, y) if (x + y) % 3 == 0 && (column + row) % 3 == 0 => 0.0,
 ///     _ => f32::NAN,
 /// };
-/// let surface = Grid::from_vec(240, 240, (0..240 * 240).map(|i| height(i % 240, i / 240)).collect()).unwrap();
-/// let found = supported_ground(&surface, &surface.map(|_| 8.0), 1.0);
+/// let heights = (0..240 * 240).map(|i| height(i % 240, i / 240)).collect();
+/// let surface = Grid::from_vec(240, 240, heights).unwrap();
+/// let ground = surface.map(|_| 8.0);
+/// let found = supported_ground(&surface, &ground, &ground, 1.0);
 /// assert!(found.data().iter().all(|ground_m| ground_m.abs() < 1.0));
 /// ```
 #[must_use]
-pub fn supported_ground(surface: &Grid<f32>, ground: &Grid<f32>, cell_m: f64) -> Grid<f32> {
+pub fn supported_ground(surface: &Grid<f32>, ground: &Grid<f32>, otherwise: &Grid<f32>, cell_m: f64) -> Grid<f32> {
     let nodes = Nodes::new(surface, cell_m);
     let given = filled(&weighted_blocks(ground, nodes.side, |_| 1.0).0);
     if given.data().iter().any(|ground_m| ground_m.is_nan()) {
-        return ground.clone();
+        return otherwise.clone();
     }
     let even = without_bumps(&given, (BUMP_M / nodes.side_m) as f32);
     let found = nodes.searched(&even, &nodes.levels(&even), DOUBT);
     let near = Levels { low_m: -(LEVELS_NEAR as f64) * nodes.level_m, count: 2 * LEVELS_NEAR + 1 };
     let found = nodes.searched(&found, &near, DOUBT_NEAR);
     let [old, new] = [nodes.support(|at| ground.data()[at]), nodes.support(|at| nodes.at(&found, at))];
-    let is_better = new.zip_map(&old, |new, old| if *new > *old + GAIN_MIN { 1.0 } else { 0.0 });
+    let gain = new.zip_map(&old, |new, old| new - old);
+    let lower = given.zip_map(&found, |given_m, found_m| given_m - found_m);
+    let is_better = gain.zip_map(&lower, |gain, lower_m| if *gain > GAIN_MIN && *lower_m > 0.0 { 1.0 } else { 0.0 });
     let share = gaussian(&is_better, 1.0);
-    let mut out = ground.clone();
+    let mut out = otherwise.clone();
     for (at, ground_m) in out.data_mut().iter_mut().enumerate() {
         *ground_m += nodes.at(&share, at).clamp(0.0, 1.0) * (nodes.at(&found, at) - *ground_m);
     }
@@ -274,8 +279,8 @@ mod tests {
 
     use super::*;
 
-    /// Houses of 8 × 8 m in squares of 14 m, whose roofs stand 6 to 20 m above a hilly slope. Of the
-    /// heights between them, one in four is wrong, and a share of `seen` lies at the ground.
+    /// Houses of 8 × 8 m in squares of 14 m, whose roofs stand 6 to 20 m above a hilly slope. Of
+    /// the heights between them, one in four is wrong, and a share of `seen` lies at the ground.
     fn quarter(seen: f64) -> (Grid<f32>, Grid<f32>) {
         let hilly = |i: usize| {
             let (x, y) = ((i % 240) as f32, (i / 240) as f32);
@@ -311,10 +316,11 @@ mod tests {
         let bump = |i: usize| 9.0 * (-((i % 240) as f32 - 120.0).hypot((i / 240) as f32 - 90.0).powi(2) / 2000.0).exp();
         let mut given = slope.clone();
         given.data_mut().iter_mut().enumerate().for_each(|(i, h)| *h += bump(i));
-        let found = supported_ground(&surface, &given, 1.0);
+        let found = supported_ground(&surface, &given, &given, 1.0);
         assert!(worst(&given, &slope) > 8.0 && worst(&found, &slope) < 1.5, "{}", worst(&found, &slope));
         // All of it lies on roofs.
-        let found = supported_ground(&surface, &slope.map(|h| h + 10.0), 1.0);
+        let high = slope.map(|h| h + 10.0);
+        let found = supported_ground(&surface, &high, &high, 1.0);
         assert!(worst(&found, &slope) < 1.5, "{}", worst(&found, &slope));
     }
 
@@ -322,10 +328,10 @@ mod tests {
     fn a_ground_that_heights_support_stays() {
         for seen in [0.1, 0.7] {
             let (slope, surface) = quarter(seen);
-            assert_eq!(worst(&supported_ground(&surface, &slope, 1.0), &slope), 0.0);
+            assert_eq!(worst(&supported_ground(&surface, &slope, &slope, 1.0), &slope), 0.0);
         }
         let (slope, _) = quarter(0.0);
-        assert_eq!(worst(&supported_ground(&slope, &slope, 1.0), &slope), 0.0);
+        assert_eq!(worst(&supported_ground(&slope, &slope, &slope, 1.0), &slope), 0.0);
     }
 
     #[test]
@@ -337,7 +343,7 @@ mod tests {
         for (_, (height, slope_m)) in cells.filter(|(i, _)| i % 50 == 0) {
             *height = slope_m - random.uniform_in(5.0, 25.0) as f32;
         }
-        assert_eq!(worst(&supported_ground(&surface, &slope, 1.0), &slope), 0.0);
+        assert_eq!(worst(&supported_ground(&surface, &slope, &slope, 1.0), &slope), 0.0);
     }
 
     #[test]
@@ -345,12 +351,12 @@ mod tests {
         let (slope, surface) = quarter(0.0);
         let given = slope.map(|h| h + 6.0);
         let known = surface.zip_map(&slope, |h, slope_m| if *h > slope_m + 5.5 { *h } else { f32::NAN });
-        let found = supported_ground(&known, &given, 1.0);
+        let found = supported_ground(&known, &given, &given, 1.0);
         // Not more than a storey from the lowest roofs.
         assert!(worst(&found, &given) < 3.0, "{}", worst(&found, &given));
         let unknown = Grid::filled(40, 30, f32::NAN);
-        assert!(supported_ground(&unknown, &unknown, 1.0).data().iter().all(|h| h.is_nan()));
+        assert!(supported_ground(&unknown, &unknown, &unknown, 1.0).data().iter().all(|h| h.is_nan()));
         let level = unknown.map(|_| 3.0);
-        assert_eq!(worst(&supported_ground(&unknown, &level, 1.0), &level), 0.0);
+        assert_eq!(worst(&supported_ground(&unknown, &level, &level, 1.0), &level), 0.0);
     }
 }

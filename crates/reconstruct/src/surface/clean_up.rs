@@ -10,8 +10,8 @@ use sweep::fusion::{
     fill_voids, ground_trend, occlusion_bounds, remove_speckle, surroundings,
 };
 use terrain::{
-    BareGround, GroundConfig, TerrainError, bare_ground_by_openings, bare_ground_of_observed, shows_hardly_but_roofs,
-    supported_ground,
+    BareGround, GroundConfig, TerrainError, bare_ground_by_openings, bare_ground_of_observed, goes_through_roofs,
+    shows_hardly_but_roofs, supported_ground,
 };
 
 use crate::surface::fill::Fill;
@@ -121,12 +121,14 @@ pub(crate) fn clean_up(
     let trust = TrustModel::new(fused, config);
     let completed = take_unseen(fused);
     let before = known(&fused.height_m, core);
-    let all_m = fused.height_m.clone();
+    let mut all_m = fused.height_m.clone();
     drop_weak(fused, &trust, gsd_m);
     let right = trust.probability(fused);
     drop_hidden(&mut fused.height_m, &right, voids.sights, tolerance_m as f32);
     let speckle_cells = ((SPECKLE_SIDE_M / gsd_m).powi(2) as usize).max(SPECKLE_CELLS_MIN);
-    remove_speckle(&mut fused.height_m, (2.0 * step_m).max(2.0 * gsd_m) as f32, speckle_cells);
+    let same_surface_m = (2.0 * step_m).max(2.0 * gsd_m) as f32;
+    remove_speckle(&mut fused.height_m, same_surface_m, speckle_cells);
+    remove_speckle(&mut all_m, same_surface_m, speckle_cells);
     forget_agreement_of_voids(fused);
     let observed = known(&fused.height_m, core);
     let trusted = trust.probability(fused).map(|p| *p >= TRUSTED);
@@ -140,7 +142,7 @@ pub(crate) fn clean_up(
     let (mut above_m, completed) = (above(&fused.height_m), above(&completed));
     let (ground_m, only_roofs) = match voids.fill {
         Fill::None => (trusted.map(|_| f32::NAN), trusted.map(|_| false)),
-        _ => ground_under(&fused.height_m, &all_m, &trusted, gsd_m),
+        _ => ground_under((&fused.height_m, &all_m), &trusted, &trend, gsd_m),
     };
     let ground = above(&ground_m);
     let known = KnownVoids {
@@ -162,11 +164,18 @@ pub(crate) fn clean_up(
 }
 
 /// Returns the ground under the trusted heights, metres, NaN far from any, and the quarters of
-/// which hardly any ground is known. Where it goes through roofs, the trend is the ground.
+/// which hardly any ground is known. Where it goes through roofs, the trend is the ground, or
+/// another ground that `all_m` supports: all heights that agree with their neighbours, weak ones
+/// included, because streets show few others.
 ///
 /// The ground tells how low a void may be. Voids are filled relative to the trend all the same:
 /// that is even, and the ground repeats the noise of the heights that it goes through.
-fn ground_under(height_m: &Grid<f32>, all_m: &Grid<f32>, trusted: &Grid<bool>, gsd_m: f64) -> (Grid<f32>, Grid<bool>) {
+fn ground_under(
+    (height_m, all_m): (&Grid<f32>, &Grid<f32>),
+    trusted: &Grid<bool>,
+    trend: &Grid<f32>,
+    gsd_m: f64,
+) -> (Grid<f32>, Grid<bool>) {
     let seen = height_m.without(|i| !trusted.data()[i]);
     let unobserved = seen.map(|h| h.is_nan());
     let config = GroundConfig::default();
@@ -178,8 +187,12 @@ fn ground_under(height_m: &Grid<f32>, all_m: &Grid<f32>, trusted: &Grid<bool>, g
         || heights(bare_ground_of_observed(&seen, Some(&unobserved), gsd_m, &config, &Silent)),
         || heights(bare_ground_by_openings(&seen, &unobserved, gsd_m, &config, &Silent)),
     );
-    let ground_m = by_planes_m.zip_map(&by_openings_m, |a, b| a.min(*b));
-    let ground_m = supported_ground(all_m, &ground_m, gsd_m);
+    let lower_m = by_planes_m.zip_map(&by_openings_m, |a, b| a.min(*b));
+    let is_through = goes_through_roofs(&by_planes_m, height_m, trend, gsd_m);
+    let mut otherwise_m = lower_m.clone();
+    let cells = otherwise_m.data_mut().iter_mut().zip(trend.data()).zip(is_through.data());
+    cells.filter(|(_, is_through)| **is_through).for_each(|((ground_m, trend_m), _)| *ground_m = *trend_m);
+    let ground_m = supported_ground(all_m, &lower_m, &otherwise_m, gsd_m);
     let only_roofs = shows_hardly_but_roofs(height_m, &ground_m, gsd_m);
     (ground_m, only_roofs)
 }
