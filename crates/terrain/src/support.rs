@@ -21,7 +21,7 @@ const NODE_M: f64 = 10.0;
 /// Distance of two levels, metres, in surfaces of finer cells: half of what heights may be off and
 /// still be right. Otherwise it is a cell, because errors of heights grow with it.
 const LEVEL_M: f64 = 0.5;
-/// Levels up to this far from another one belong to it, and those further below it do not.
+/// Heights within this many levels of a ground support it, and those further below contradict it.
 const LEVELS_AT: usize = 2;
 /// Standard deviation over which a given ground is smoothed, metres. It takes away the bumps that
 /// blocks of houses make, and leaves hills.
@@ -332,6 +332,13 @@ mod tests {
         }
         let (slope, _) = quarter(0.0);
         assert_eq!(worst(&supported_ground(&slope, &slope, &slope, 1.0), &slope), 0.0);
+    }
+
+    #[test]
+    fn a_ground_is_not_lifted() {
+        let (slope, surface) = quarter(0.1);
+        let deep = slope.map(|h| h - 5.0);
+        assert_eq!(worst(&supported_ground(&surface, &deep, &deep, 1.0), &deep), 0.0);
     }
 
     #[test]
