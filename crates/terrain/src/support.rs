@@ -64,7 +64,7 @@ const SHARE_MIN: f32 = 0.03;
 /// use raster::Grid;
 /// use terrain::supported_ground;
 ///
-/// // Roofs of 6 to 20 m with voids between them; every third street is known in every third part.
+/// // Roofs of 6 to 20 m. In every third square a third of the street around the roof is known.
 /// let height = |column: usize, row: usize| match (column / 15, row / 15) {
 ///     (x, y) if column % 15 < 9 && row % 15 < 9 => 6.0 + ((7 * x + 5 * y) % 15) as f32,
 ///     (x, y) if (x + y) % 3 == 0 && (column + row) % 3 == 0 => 0.0,

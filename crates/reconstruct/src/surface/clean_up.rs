@@ -128,7 +128,6 @@ pub(crate) fn clean_up(
     let speckle_cells = ((SPECKLE_SIDE_M / gsd_m).powi(2) as usize).max(SPECKLE_CELLS_MIN);
     let same_surface_m = (2.0 * step_m).max(2.0 * gsd_m) as f32;
     remove_speckle(&mut fused.height_m, same_surface_m, speckle_cells);
-    remove_speckle(&mut all_m, same_surface_m, speckle_cells);
     forget_agreement_of_voids(fused);
     let observed = known(&fused.height_m, core);
     let trusted = trust.probability(fused).map(|p| *p >= TRUSTED);
@@ -142,7 +141,10 @@ pub(crate) fn clean_up(
     let (mut above_m, completed) = (above(&fused.height_m), above(&completed));
     let (ground_m, only_roofs) = match voids.fill {
         Fill::None => (trusted.map(|_| f32::NAN), trusted.map(|_| false)),
-        _ => ground_under((&fused.height_m, &all_m), &trusted, &trend, gsd_m),
+        _ => {
+            remove_speckle(&mut all_m, same_surface_m, speckle_cells);
+            ground_under((&fused.height_m, &all_m), &trusted, &trend, gsd_m)
+        }
     };
     let ground = above(&ground_m);
     let known = KnownVoids {
@@ -164,9 +166,9 @@ pub(crate) fn clean_up(
 }
 
 /// Returns the ground under the trusted heights, metres, NaN far from any, and the quarters of
-/// which hardly any ground is known. Where it goes through roofs, the trend is the ground, or
-/// another ground that `all_m` supports: all heights that agree with their neighbours, weak ones
-/// included, because streets show few others.
+/// which hardly any ground is known. Where clearly more heights of `all_m` support a lower ground,
+/// that is the ground; elsewhere the trend is, where the ground goes through roofs. `all_m` has all
+/// heights that agree with their neighbours, weak ones included, because streets show few others.
 ///
 /// The ground tells how low a void may be. Voids are filled relative to the trend all the same:
 /// that is even, and the ground repeats the noise of the heights that it goes through.
