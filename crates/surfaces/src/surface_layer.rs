@@ -23,24 +23,29 @@ pub(crate) struct WeakCells {
     /// Names of the layers that were read.
     pub(crate) files: Vec<String>,
     /// Cells with a filled height.
-    pub(crate) filled: usize,
+    pub(crate) filled: Grid<bool>,
     /// Other cells whose probability is below the wanted one.
     pub(crate) doubtful: usize,
+}
+
+impl WeakCells {
+    /// Returns the number of cells with a filled height.
+    pub(crate) fn filled_count(&self) -> usize {
+        self.filled.data().iter().filter(|is_filled| **is_filled).count()
+    }
 }
 
 /// Returns the cells of which a layer beside the surface says that their height was filled, or that
 /// it is right with a probability below `least_confidence`. A layer of another size is not one of
 /// this surface.
 pub(crate) fn weak_cells(surface: &Dem, least_confidence: f32) -> Result<WeakCells, RasterError> {
-    let mut mask = surface.heights.map(|_| false);
-    let (mut files, mut filled, mut doubtful) = (Vec::new(), 0, 0);
+    let mut filled = surface.heights.map(|_| false);
+    let (mut files, mut doubtful) = (Vec::new(), 0);
     if let Some(source) = layer_beside(surface, SOURCE)? {
         files.push(SOURCE.to_owned());
-        for (is_weak, source) in mask.data_mut().iter_mut().zip(source.data()) {
-            *is_weak = CellOrigin::from_source_code(*source as i32) == CellOrigin::Filled;
-            filled += usize::from(*is_weak);
-        }
+        filled = source.map(|source| CellOrigin::from_source_code(*source as i32) == CellOrigin::Filled);
     }
+    let mut mask = filled.clone();
     if let Some(confidence) = layer_beside(surface, CONFIDENCE)? {
         files.push(CONFIDENCE.to_owned());
         for (is_weak, confidence) in mask.data_mut().iter_mut().zip(confidence.data()) {

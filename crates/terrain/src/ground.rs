@@ -46,7 +46,7 @@ const RING_M: f64 = 3.0;
 /// Height above the ground around it up to which a cell of the ring, or a cell of the surface, is
 /// ground, metres: the noise of satellite surfaces. It was chosen on simulated towns (seeds 4 to 6)
 /// and JAX_068.
-const RISE_M: f32 = 0.7;
+pub(crate) const RISE_M: f32 = 0.7;
 /// Share of the cells that lie on ground as smooth as the noise allows; others are rough. The
 /// deviations of smooth cells spread little, so the lowest of them tell the noise.
 const SMOOTH_SHARE: f64 = 0.1;

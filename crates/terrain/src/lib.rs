@@ -62,4 +62,4 @@ pub use ground::{
 };
 pub use roofs::{goes_through_roofs, shows_hardly_but_roofs};
 pub use smooth::without_noise;
-pub use support::supported_ground;
+pub use support::{supported_ground, with_supported_ground};

@@ -13,6 +13,7 @@
 use raster::{Grid, gaussian};
 
 use crate::coarse::{at_cell, difference, weighted_blocks};
+use crate::ground::{BareGround, GROUND, RISE_M, UNDER_OBJECT, UNKNOWN, VOID_FILLED};
 use crate::membrane::filled;
 use crate::trend::fitted;
 
@@ -97,6 +98,28 @@ pub fn supported_ground(surface: &Grid<f32>, ground: &Grid<f32>, otherwise: &Gri
         *ground_m += nodes.at(&share, at).clamp(0.0, 1.0) * (nodes.at(&found, at) - *ground_m);
     }
     out
+}
+
+/// Returns a ground as [`supported_ground`] does, with the states of the cells that follow from it.
+/// Heights of the surface at the new ground show it.
+#[must_use]
+pub fn with_supported_ground(found: BareGround, surface: &Grid<f32>, cell_m: f64) -> BareGround {
+    let BareGround { mut heights, mut states } = found;
+    let supported = supported_ground(surface, &heights, &heights, cell_m);
+    for (at, new_m) in supported.data().iter().enumerate() {
+        let (old_m, state, own_m) = (&mut heights.data_mut()[at], &mut states.data_mut()[at], surface.data()[at]);
+        if *state == UNKNOWN || *new_m == *old_m {
+            continue;
+        }
+        let is_ground = (own_m - new_m).abs() <= RISE_M;
+        *old_m = if is_ground { own_m } else { *new_m };
+        *state = match (is_ground, own_m.is_nan()) {
+            (true, _) => GROUND,
+            (false, true) => VOID_FILLED,
+            (false, false) => UNDER_OBJECT,
+        };
+    }
+    BareGround { heights, states }
 }
 
 /// Levels of a search, relative to a guess.
@@ -322,6 +345,28 @@ mod tests {
         let high = slope.map(|h| h + 10.0);
         let found = supported_ground(&surface, &high, &high, 1.0);
         assert!(worst(&found, &slope) < 1.5, "{}", worst(&found, &slope));
+    }
+
+    #[test]
+    fn states_follow_a_lower_ground() {
+        let (slope, surface) = quarter(0.1);
+        let heights = slope.map(|h| h + 10.0);
+        let mut states = heights.map(|_| GROUND);
+        states.row_mut(0).fill(UNKNOWN);
+        let found = with_supported_ground(BareGround { heights, states }, &surface, 1.0);
+        assert!(found.states.row(0).iter().all(|state| *state == UNKNOWN));
+        for (at, state) in found.states.data().iter().enumerate().skip(240) {
+            let (ground_m, own_m) = (found.heights.data()[at], surface.data()[at]);
+            match *state {
+                GROUND => assert_eq!(ground_m, own_m),
+                UNDER_OBJECT => assert!((own_m - ground_m).abs() > RISE_M),
+                state => assert!(state == VOID_FILLED && own_m.is_nan()),
+            }
+        }
+        let streets = slope.zip_map(&surface, |h, own_m| (own_m - h).abs() < 0.5);
+        let seen = streets.data().iter().zip(found.states.data()).filter(|(is_street, _)| **is_street);
+        let (all, ground) = seen.fold((0, 0), |(all, ground), (_, s)| (all + 1, ground + usize::from(*s == GROUND)));
+        assert!(all > 3000 && ground * 5 > all * 4, "{ground} of {all}");
     }
 
     #[test]

@@ -43,6 +43,7 @@ impl ClassLayers {
 /// this surface.
 pub(super) fn weak_cells(surface: &Dem) -> Result<(Option<Grid<bool>>, ClassLayers), ClassesError> {
     let found = surface_layer::weak_cells(surface, LEAST_CONFIDENCE).map_err(FileError::write)?;
-    let layers = ClassLayers { files: found.files, cells_filled: found.filled, cells_doubtful: found.doubtful };
+    let cells_filled = found.filled_count();
+    let layers = ClassLayers { files: found.files, cells_filled, cells_doubtful: found.doubtful };
     Ok((found.mask, layers))
 }

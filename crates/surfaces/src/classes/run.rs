@@ -9,7 +9,7 @@ use formats::raster::{Band, BandData, CogRaster, Dem, read_dem, write_cog};
 use numeric::Progress;
 use raster::Grid;
 use report::{Legend, LightEnd, MapLayer};
-use terrain::{BareGround, bare_ground_of_observed};
+use terrain::BareGround;
 
 use super::config::ClassesConfig;
 use super::cue::{Cue, unsure_heights};
@@ -84,8 +84,7 @@ fn steps(config: &ClassesConfig, progress: &dyn Progress) -> Result<ClassesRepor
             None => None,
         };
         let folder = OutputFolder::take(&config.output)?;
-        let (unobserved, _) = dtm::unobserved(&surface)?;
-        let ground = bare_ground_of_observed(&surface.heights, unobserved.as_ref(), cell_m, &config.terrain, progress)?;
+        let (ground, _) = dtm::bare_ground(&surface, cell_m, &config.terrain, progress)?;
         progress.check_cancelled()?;
         let ground_share = checked_ground(&surface, &ground, progress)?;
         let (weak, layers) = weak_cells(&surface)?;

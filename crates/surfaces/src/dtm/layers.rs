@@ -5,8 +5,10 @@
 //! smoothed.
 
 use formats::raster::Dem;
+use numeric::Progress;
 use raster::Grid;
 use serde::Serialize;
+use terrain::{BareGround, GroundConfig, bare_ground_of_observed, with_supported_ground};
 
 use super::error::DtmError;
 use crate::surface_layer::{self, NO_LAYERS, SIGMA};
@@ -44,23 +46,33 @@ impl SurfaceLayers {
     }
 }
 
-/// Reads the layers beside a surface. Returns the cells that nothing has measured, if there are
-/// layers.
+/// Finds the ground under a surface by the layers beside it. The streets of dense quarters show
+/// hardly any but weak heights: together these can support a lower ground.
 ///
 /// # Errors
-/// [`DtmError::Job`] for a layer that cannot be read. A layer of another size is not one of this
-/// surface.
-pub(crate) fn unobserved(surface: &Dem) -> Result<(Option<Grid<bool>>, SurfaceLayers), DtmError> {
-    let found = surface_layer::weak_cells(surface, LEAST_CONFIDENCE).map_err(FileError::write)?;
-    let layers = SurfaceLayers { files: found.files, cells_filled: found.filled, cells_weak: found.doubtful };
-    Ok((found.mask, layers))
+/// [`DtmError::Job`] for a layer that cannot be read, [`DtmError::Terrain`]. A layer of another size
+/// is not one of this surface.
+pub(crate) fn bare_ground(
+    surface: &Dem,
+    cell_m: f64,
+    config: &GroundConfig,
+    progress: &dyn Progress,
+) -> Result<(BareGround, SurfaceLayers), DtmError> {
+    let weak = surface_layer::weak_cells(surface, LEAST_CONFIDENCE).map_err(FileError::write)?;
+    let mut ground = bare_ground_of_observed(&surface.heights, weak.mask.as_ref(), cell_m, config, progress)?;
+    if weak.mask.is_some() {
+        let observed = surface.heights.without(|cell| weak.filled.data()[cell]);
+        ground = with_supported_ground(ground, &observed, cell_m);
+    }
+    let cells_filled = weak.filled_count();
+    Ok((ground, SurfaceLayers { files: weak.files, cells_filled, cells_weak: weak.doubtful }))
 }
 
 /// Reads the standard errors of the heights, metres, if they lie beside the surface, and adds their
 /// file to the layers.
 ///
 /// # Errors
-/// As [`unobserved`].
+/// As [`bare_ground`].
 pub(crate) fn standard_errors(surface: &Dem, layers: &mut SurfaceLayers) -> Result<Option<Grid<f32>>, DtmError> {
     let sigma_m = surface_layer::layer_beside(surface, SIGMA).map_err(FileError::write)?;
     layers.files.extend(sigma_m.is_some().then(|| SIGMA.to_owned()));

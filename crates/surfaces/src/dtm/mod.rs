@@ -24,7 +24,7 @@ mod run;
 pub use config::DtmConfig;
 pub(crate) use error::DtmError;
 pub use layers::SurfaceLayers;
-pub(crate) use layers::unobserved;
+pub(crate) use layers::bare_ground;
 pub use report::DtmReport;
 pub use run::FILES;
 pub(crate) use run::read_surface;

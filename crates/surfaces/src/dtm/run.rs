@@ -5,11 +5,11 @@ use formats::raster::{Band, BandData, CogRaster, Dem, read_dem, write_cog};
 use numeric::Progress;
 use raster::Grid;
 use report::{Legend, LightEnd, MapLayer};
-use terrain::{BareGround, GROUND, UNDER_OBJECT, UNKNOWN, VOID_FILLED, bare_ground_of_observed, without_noise};
+use terrain::{BareGround, GROUND, UNDER_OBJECT, UNKNOWN, VOID_FILLED, without_noise};
 
 use super::config::DtmConfig;
 use super::error::DtmError;
-use super::layers::{standard_errors, unobserved};
+use super::layers::{bare_ground, standard_errors};
 use super::report::DtmReport;
 use job::error::JobError;
 use job::files::{self, FileError};
@@ -63,10 +63,8 @@ fn steps(config: &DtmConfig, progress: &dyn Progress) -> Result<DtmReport, DtmEr
     threads::install(config.threads, || {
         let (surface, cell_m, crs) = read_surface(config, progress)?;
         let folder = OutputFolder::take(&config.output)?;
-        let (unobserved, mut layers) = unobserved(&surface)?;
+        let (mut terrain, mut layers) = bare_ground(&surface, cell_m, &config.terrain, progress)?;
         let sigma_m = standard_errors(&surface, &mut layers)?;
-        let mut terrain =
-            bare_ground_of_observed(&surface.heights, unobserved.as_ref(), cell_m, &config.terrain, progress)?;
         if let Some(sigma_m) = sigma_m {
             terrain = without_noise(terrain, &sigma_m, cell_m)?;
         }
