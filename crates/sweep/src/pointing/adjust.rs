@@ -6,7 +6,7 @@
 //! Cauchy weights on a robust scale. A weak prior holds what ties cannot determine, such as a
 //! common shift of all views, so that corrections stay as small as possible. The order of the
 //! corrections is the one with the least Bayesian information criterion, for the number of
-//! independent tracks.
+//! independent tracks. More than a shift needs strong evidence.
 
 use std::collections::BTreeSet;
 
@@ -94,6 +94,11 @@ const VIEWS_OF_A_SCENE: f64 = 8.0;
 const SCALE_MIN_PX: f64 = 0.05;
 /// Median of the size of a normal deviate, standard deviations.
 const NORMAL_MEDIAN: f64 = 0.6745;
+/// Least difference of the Bayesian information criteria for which drifts or affine maps take the
+/// place of a lower order: "strong" evidence (Kass and Raftery 1995,
+/// <https://doi.org/10.1080/01621459.1995.10476572>). Every RPC is off by a shift, few by more, and
+/// a drift that ties only seem to have bends the surface. True ones differ by about a hundred.
+const STRONG: f64 = 6.0;
 /// Ground points closer to each other than this in their first view are one for the choice of the
 /// order, pixels: the side of the patches that are matched, which then share their pixels.
 const PATCH_PX: f64 = 15.0;
@@ -158,7 +163,8 @@ pub fn adjust_to_control(
     });
     for (mut fit, bic) in candidates.into_iter().chain(others) {
         fit.residual_px.0 = before;
-        if best.as_ref().is_none_or(|(least, _)| bic < *least) {
+        let margin = if fit.order > ModelOrder::Translation { STRONG } else { 0.0 };
+        if best.as_ref().is_none_or(|(least, _)| bic < *least - margin) {
             best = Some((bic, fit));
         }
     }

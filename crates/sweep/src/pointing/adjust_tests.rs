@@ -137,6 +137,26 @@ fn the_order_is_that_of_the_planted_errors() {
     }
 }
 
+/// The first two views drift to opposite sides, among errors of half a pixel.
+#[test]
+fn a_drift_needs_strong_evidence() {
+    let cameras = three_cameras();
+    let half = 0.5 * SIZE as f64;
+    let order = |drift_px: f64| {
+        let wrong = |view: usize, p: ImagePoint| {
+            let along = [drift_px, -drift_px, 0.0][view] * (p.line / half - 1.0);
+            let [sample, line] = error(ModelOrder::Translation, view, p);
+            let at = (p.sample * 31.0 + p.line * 57.0) as usize;
+            [sample + along + 0.5 * noise(at), line + 0.5 * noise(at + 1)]
+        };
+        adjust(&cameras, &[(SIZE, SIZE); 3], &seen(&lattice(), &cameras, wrong), &AdjustConfig::default()).order
+    };
+    assert_eq!(order(0.0), ModelOrder::Translation);
+    // The criterion alone would follow this one already.
+    assert_eq!(order(0.35), ModelOrder::Translation);
+    assert_eq!(order(0.6), ModelOrder::Drift);
+}
+
 /// Two views whose lines are stretched alike, and that have a small drift between them: ties of two
 /// views hardly tell the stretch, and do not turn it into a drift along the samples, which tilts
 /// the ground.
