@@ -102,7 +102,8 @@ fn layers_beside_a_surface_say_what_was_not_measured() {
     // The western quarter was filled.
     write("source.tif", &layer(&|column| column < width / 4, [1, 4]));
     let filled = width / 4 * height;
-    run("layers", &[]).code(0).stdout(predicate::str::contains(format!("{filled} filled and 0 weak cells")));
+    let told = format!("{filled} filled cells are no evidence of the ground, and 0 weak ones");
+    run("layers", &[]).code(0).stdout(predicate::str::contains(told));
     classes("classes").code(0).stdout(predicate::str::contains(format!("{filled} filled and 0 doubtful cells")));
     let report: Value =
         serde_json::from_slice(&std::fs::read(folder.path().join("classes/classes.json")).unwrap()).unwrap();

@@ -4280,7 +4280,7 @@ class SurfaceLayers(Report):
     """Cells with a filled height."""
 
     cells_weak: int
-    """Observed cells whose probability is too low to be evidence."""
+    """Observed cells whose probability is too low to be evidence by itself."""
 
 
 class SurfaceProtocol(Report):

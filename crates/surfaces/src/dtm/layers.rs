@@ -1,8 +1,8 @@
 //! What a surface says of its cells: the layers that a DSM run writes beside `dsm.tif`.
 //!
-//! Filled cells are no evidence of the ground, and neither are cells whose height is hardly ever
-//! right. Other weak cells still show much ground. The standard errors tell how far the ground is
-//! smoothed.
+//! Filled cells are no evidence of the ground. Cells whose height is hardly ever right count only
+//! where many of them support a lower ground. Other weak cells still show much ground. The standard
+//! errors tell how far the ground is smoothed.
 
 use formats::raster::Dem;
 use numeric::Progress;
@@ -14,8 +14,9 @@ use super::error::DtmError;
 use crate::surface_layer::{self, NO_LAYERS, SIGMA};
 use job::files::FileError;
 
-/// Probability below which a cell is no evidence: the DSM itself drops such heights where those
-/// around are weak, too. On ten simulated places 0.1 gives a worse ground, and 0.35 no better one.
+/// Probability below which a cell alone is no evidence: the DSM itself drops such heights where
+/// those around are weak, too. On ten simulated places 0.1 gives a worse ground, and 0.35 no better
+/// one.
 const LEAST_CONFIDENCE: f32 = 0.25;
 
 /// Layers that were found beside a surface, and what they say.
@@ -26,7 +27,7 @@ pub struct SurfaceLayers {
     pub files: Vec<String>,
     /// Cells with a filled height.
     pub cells_filled: usize,
-    /// Observed cells whose probability is too low to be evidence.
+    /// Observed cells whose probability is too low to be evidence by itself.
     pub cells_weak: usize,
 }
 
@@ -40,7 +41,7 @@ impl SurfaceLayers {
         let is_smoothed = self.files.iter().any(|name| name == SIGMA);
         let smoothed = if is_smoothed { "; the ground is smoothed as far as its heights are uncertain" } else { "" };
         format!(
-            "{}: {filled} filled and {weak} weak cells are no evidence of the ground{smoothed}",
+            "{}: {filled} filled cells are no evidence of the ground, and {weak} weak ones only together{smoothed}",
             self.files.join(", ")
         )
     }
@@ -50,8 +51,8 @@ impl SurfaceLayers {
 /// hardly any but weak heights: together these can support a lower ground.
 ///
 /// # Errors
-/// [`DtmError::Job`] for a layer that cannot be read, [`DtmError::Terrain`]. A layer of another size
-/// is not one of this surface.
+/// [`DtmError::Job`] for a layer that cannot be read, [`DtmError::Terrain`]. A layer of another
+/// size is not one of this surface.
 pub(crate) fn bare_ground(
     surface: &Dem,
     cell_m: f64,

@@ -1,8 +1,8 @@
 //! The DTM job: the bare ground under a surface model, and the heights above it.
 //!
-//! Where the layers of a DSM run lie beside the surface, filled cells and those that are hardly
-//! ever right are no evidence of the ground. The ground is smoothed as far as the standard errors
-//! of the heights ask for.
+//! Where the layers of a DSM run lie beside the surface, filled cells are no evidence of the
+//! ground. Those that are hardly ever right count only where many of them support a lower ground.
+//! The ground is smoothed as far as the standard errors of the heights ask for.
 //!
 //! Three rasters and a report are written into one folder, on the grid and in the vertical datum of
 //! the surface:
