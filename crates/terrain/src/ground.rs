@@ -269,19 +269,23 @@ fn at_cells(surface: &Grid<f32>, ground: &Grid<f32>, coarse: &Grid<f32>, side: u
     let mut states = Grid::filled(width, height, UNKNOWN);
     for row in 0..height {
         for column in 0..width {
-            let (own, block) = (surface[(column, row)], (column / side, row / side));
-            let below = at_cell(coarse, side, column, row);
-            let is_ground = !ground[block].is_nan() && (own - below).abs() <= RISE_M;
-            if !is_near[block] {
-                continue;
+            let block = (column / side, row / side);
+            if is_near[block] {
+                let (own_m, below_m) = (surface[(column, row)], at_cell(coarse, side, column, row));
+                let may_show = !ground[block].is_nan();
+                (heights[(column, row)], states[(column, row)]) = shown_or_below(own_m, below_m, may_show);
             }
-            heights[(column, row)] = if is_ground { own } else { below };
-            states[(column, row)] = match (is_ground, own.is_nan()) {
-                (true, _) => GROUND,
-                (false, true) => VOID_FILLED,
-                (false, false) => UNDER_OBJECT,
-            };
         }
     }
     BareGround { heights, states }
+}
+
+/// Returns height and state of a cell above a known ground: its own height if it may show the
+/// ground and lies at it.
+pub(crate) fn shown_or_below(own_m: f32, below_m: f32, may_show: bool) -> (f32, u8) {
+    match may_show && (own_m - below_m).abs() <= RISE_M {
+        true => (own_m, GROUND),
+        false if own_m.is_nan() => (below_m, VOID_FILLED),
+        false => (below_m, UNDER_OBJECT),
+    }
 }

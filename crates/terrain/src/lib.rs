@@ -27,7 +27,7 @@
 //! 6. Where the surface says how uncertain its heights are, the ground is **smoothed** as far as
 //!    they are: [`without_noise`].
 //! 7. Among dense houses the ground is the one that most heights **support**, with few beneath it:
-//!    [`supported_ground`].
+//!    [`supported_ground`], [`with_supported_ground`].
 //!
 //! Heights are in metres above any datum, NaN is a void. The work is done on cells of about a metre
 //! and takes memory in proportion to the cells.

@@ -13,7 +13,7 @@
 use raster::{Grid, gaussian};
 
 use crate::coarse::{at_cell, difference, weighted_blocks};
-use crate::ground::{BareGround, GROUND, RISE_M, UNDER_OBJECT, UNKNOWN, VOID_FILLED};
+use crate::ground::{BareGround, UNKNOWN, shown_or_below};
 use crate::membrane::filled;
 use crate::trend::fitted;
 
@@ -100,24 +100,18 @@ pub fn supported_ground(surface: &Grid<f32>, ground: &Grid<f32>, otherwise: &Gri
     out
 }
 
-/// Returns a ground as [`supported_ground`] does, with the states of the cells that follow from it.
-/// Heights of the surface at the new ground show it.
+/// Returns the ground that was `found` under a surface with cells of `cell_m` metres, or a lower
+/// one where clearly more heights support it, as [`supported_ground`] does. Cells of the surface
+/// that lie at the lower ground show it. Heights are in metres, voids of the surface are NaN.
 #[must_use]
 pub fn with_supported_ground(found: BareGround, surface: &Grid<f32>, cell_m: f64) -> BareGround {
     let BareGround { mut heights, mut states } = found;
     let supported = supported_ground(surface, &heights, &heights, cell_m);
     for (at, new_m) in supported.data().iter().enumerate() {
         let (old_m, state, own_m) = (&mut heights.data_mut()[at], &mut states.data_mut()[at], surface.data()[at]);
-        if *state == UNKNOWN || *new_m == *old_m {
-            continue;
+        if *state != UNKNOWN && *new_m != *old_m {
+            (*old_m, *state) = shown_or_below(own_m, *new_m, true);
         }
-        let is_ground = (own_m - new_m).abs() <= RISE_M;
-        *old_m = if is_ground { own_m } else { *new_m };
-        *state = match (is_ground, own_m.is_nan()) {
-            (true, _) => GROUND,
-            (false, true) => VOID_FILLED,
-            (false, false) => UNDER_OBJECT,
-        };
     }
     BareGround { heights, states }
 }
@@ -301,6 +295,7 @@ mod tests {
     use numeric::SplitMix64;
 
     use super::*;
+    use crate::ground::{GROUND, RISE_M, UNDER_OBJECT, VOID_FILLED};
 
     /// Houses of 8 × 8 m in squares of 14 m, whose roofs stand 6 to 20 m above a hilly slope. Of
     /// the heights between them, one in four is wrong, and a share of `seen` lies at the ground.
