@@ -1,6 +1,7 @@
 //! Cells of about a metre on which objects are searched, and simple filters on them.
 
 use raster::Grid;
+use rayon::prelude::*;
 
 /// Half-width over which a ground is smoothed, twice, before its slope is taken, metres.
 const SLOPE_HALF_WIDTH_M: f64 = 5.0;
@@ -29,18 +30,39 @@ pub(crate) fn blocks(fine: &Grid<f32>, side: usize) -> Grid<f32> {
     coarse
 }
 
-/// Interpolates a raster of blocks at a cell of the raster that it was made of.
-pub(crate) fn at_cell(coarse: &Grid<f32>, side: usize, column: usize, row: usize) -> f32 {
-    let place = |at: usize, count: usize| {
-        // Half a block beyond the outer centres the slope goes on.
+/// Interpolates a raster of blocks at all cells of the raster of `size` that it was made of.
+pub(crate) fn spread(coarse: &Grid<f32>, side: usize, (width, height): (usize, usize)) -> Grid<f32> {
+    let columns: Vec<Place> = (0..width).map(|column| Place::of(column, side, coarse.width())).collect();
+    let mut out = Grid::filled(width, height, f32::NAN);
+    out.data_mut().par_chunks_mut(width.max(1)).enumerate().for_each(|(row, line)| {
+        let row = Place::of(row, side, coarse.height());
+        line.iter_mut().zip(&columns).for_each(|(height, column)| *height = between(coarse, *column, row));
+    });
+    out
+}
+
+/// Place of a cell between the centres of two blocks, along columns or rows.
+#[derive(Clone, Copy)]
+struct Place {
+    low: usize,
+    next: usize,
+    /// Distance from the centre of the block `low`, in blocks. Half a block beyond the outer
+    /// centres the slope goes on.
+    part: f32,
+}
+
+impl Place {
+    fn of(at: usize, side: usize, count: usize) -> Self {
         let position = (at as f32 + 0.5) / side as f32 - 0.5;
         let low = (position.max(0.0) as usize).min(count.saturating_sub(2));
-        (low, (low + 1).min(count - 1), position - low as f32)
-    };
-    let (x, x_next, fx) = place(column, coarse.width());
-    let (y, y_next, fy) = place(row, coarse.height());
-    let line = |y: usize| coarse[(x, y)] + fx * (coarse[(x_next, y)] - coarse[(x, y)]);
-    line(y) + fy * (line(y_next) - line(y))
+        Self { low, next: (low + 1).min(count - 1), part: position - low as f32 }
+    }
+}
+
+fn between(coarse: &Grid<f32>, column: Place, row: Place) -> f32 {
+    let along = |line: &[f32]| line[column.low] + column.part * (line[column.next] - line[column.low]);
+    let (low, next) = (along(coarse.row(row.low)), along(coarse.row(row.next)));
+    low + row.part * (next - low)
 }
 
 /// Returns the weighted means of the known heights of `side` × `side` cells, and the means of the

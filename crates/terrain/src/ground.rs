@@ -6,12 +6,13 @@ use numeric::Progress;
 use raster::Grid;
 
 use crate::canopy::under_forests;
-use crate::coarse::{add, at_cell, blocks, slopes, smooth_slopes, widened, without_cells};
+use crate::coarse::{add, blocks, slopes, smooth_slopes, spread, widened, without_cells};
 use crate::config::{GroundConfig, NOISE_DEVIATIONS};
 use crate::error::TerrainError;
 use crate::forest::{forests, roughness};
 use crate::heights::Heights;
 use crate::membrane::filled;
+use crate::narrow::Vanishing;
 use crate::objects::{objects, radii};
 use crate::outliers::OffPlanes;
 use crate::pits::pits;
@@ -190,13 +191,14 @@ fn searched(
     // Without any height the raster stays unknown, and has no trend.
     if clear_m.data().iter().any(|h| !h.is_nan()) {
         let heights = Heights { clear: &clear_m, whole: &evidence_m, cell_m: work_m, noise_m };
+        let vanishing = Vanishing::of(&heights, config);
         let first = trend(&clear_m, work_m, &FIRST_TREND);
-        found = objects(&heights, (&first, &slopes(&first, work_m)), config, progress)?;
+        found = objects(&heights, &vanishing, (&first, &slopes(&first, work_m)), config, progress)?;
         // What one of the trends hides, another shows; ground joins again below.
         for later in &LATER_TRENDS {
             let known = filled(&without_cells(&clear_m, &found));
-            let again =
-                objects(&heights, (&trend(&known, work_m, later), &smooth_slopes(&known, work_m)), config, progress)?;
+            let by_later = (&trend(&known, work_m, later), &smooth_slopes(&known, work_m));
+            let again = objects(&heights, &vanishing, by_later, config, progress)?;
             add(&mut found, &again);
         }
         if search == Search::OpeningsAndPlanes {
@@ -267,11 +269,12 @@ fn at_cells(surface: &Grid<f32>, ground: &Grid<f32>, coarse: &Grid<f32>, side: u
     let is_near = widened(&ground.map(|h| !h.is_nan()), reach.round() as usize);
     let mut heights = Grid::filled(width, height, f32::NAN);
     let mut states = Grid::filled(width, height, UNKNOWN);
+    let below = spread(coarse, side, (width, height));
     for row in 0..height {
         for column in 0..width {
             let block = (column / side, row / side);
             if is_near[block] {
-                let (own_m, below_m) = (surface[(column, row)], at_cell(coarse, side, column, row));
+                let (own_m, below_m) = (surface[(column, row)], below[(column, row)]);
                 let may_show = !ground[block].is_nan();
                 (heights[(column, row)], states[(column, row)]) = shown_or_below(own_m, below_m, may_show);
             }

@@ -1,15 +1,18 @@
 //! A membrane through known heights: Laplace's equation on the unknown cells, solved from coarse to
 //! fine cells. Borders of the raster are free (no slope across them).
 
+use multiversion::multiversion;
 use raster::Grid;
 
 use crate::coarse::weighted_blocks;
-use crate::runs::{Run, runs};
+use crate::runs::{LANES, Run, runs};
 
 /// Sweeps over the unknown cells of each level. The coarser level has done the rest.
 const SWEEPS: usize = 24;
 /// Over-relaxation of a sweep, which carries heights faster into wide gaps.
 const RELAXATION: f32 = 1.6;
+/// Share of the distance to each neighbour that a cell moves by.
+const PART: f32 = 0.25 * RELAXATION;
 
 /// Fills the NaN cells of a surface. A surface without any height stays as it is.
 pub(crate) fn filled(known: &Grid<f32>) -> Grid<f32> {
@@ -19,9 +22,9 @@ pub(crate) fn filled(known: &Grid<f32>) -> Grid<f32> {
     let coarse = filled(&halved(known));
     let unknown = runs(&known.map(|h| h.is_nan()));
     let mut out = completed(known, &coarse);
-    let mut ahead = Vec::with_capacity(known.width());
+    let mut moves = Vec::with_capacity(known.width());
     for _ in 0..SWEEPS {
-        unknown.iter().for_each(|run| relax(&mut out, run, &mut ahead));
+        unknown.iter().for_each(|run| relax(&mut out, run, &mut moves));
     }
     out
 }
@@ -29,28 +32,40 @@ pub(crate) fn filled(known: &Grid<f32>) -> Grid<f32> {
 /// Moves the unknown cells of a run, from left to right, towards the mean of their neighbours. A
 /// neighbour beyond the border has the height of the cell itself.
 ///
-/// `ahead` is memory for what does not depend on the cell to the left, which vector instructions
-/// sum up for the whole run.
-fn relax(out: &mut Grid<f32>, Run { row, columns }: &Run, ahead: &mut Vec<f32>) {
-    const PART: f32 = 0.25 * RELAXATION;
-    let (first, last) = (columns.start, out.width() - 1);
-    let own = out.row(*row);
-    let (above, below) = (out.row(row.saturating_sub(1)), out.row((row + 1).min(out.height() - 1)));
-    ahead.clear();
-    let count = columns.end.min(last) - first;
-    let [right, own_part, above_part, below_part] =
-        [&own[first + 1..], &own[first..], &above[first..], &below[first..]].map(|line| &line[..count]);
-    ahead.extend((0..count).map(|x| {
-        let from = |line: &[f32]| line[x] - own_part[x];
-        PART * (from(right) + from(above_part) + from(below_part))
-    }));
-    if columns.end > last {
-        ahead.push(PART * ((above[last] - own[last]) + (below[last] - own[last])));
+/// `moves` is memory for what each cell would move by if the one to its left stayed, which vector
+/// instructions find for the whole run. Differences are small and hardly rounded, however high the
+/// ground lies.
+fn relax(out: &mut Grid<f32>, Run { row, columns }: &Run, moves: &mut Vec<f32>) {
+    let last = out.width() - 1;
+    let [above, own, below] = [row.saturating_sub(1), *row, (row + 1).min(out.height() - 1)].map(|row| out.row(row));
+    moves.resize(columns.len() + LANES, 0.0);
+    let start = columns.start.max(1).min(columns.end);
+    let end = columns.end.min(last).max(start);
+    for column in (columns.start..start).chain(end..columns.end) {
+        let here = own[column];
+        let (left, right) = (own[column.saturating_sub(1)], own[(column + 1).min(last)]);
+        let apart = (left - here) + (right - here) + (above[column] - here) + (below[column] - here);
+        moves[column - columns.start] = PART * apart;
     }
-    let mut left = own[first.saturating_sub(1)];
-    for (cell, ahead) in out.row_mut(*row)[columns.clone()].iter_mut().zip(ahead) {
-        *cell += *ahead + PART * (left - *cell);
-        left = *cell;
+    if start < end {
+        let count = (end - start).next_multiple_of(LANES).min(last - start);
+        moves_inside([above, own, below], start, &mut moves[start - columns.start..][..count]);
+    }
+    let mut moved = 0.0;
+    for (cell, alone) in out.row_mut(*row)[columns.clone()].iter_mut().zip(moves) {
+        moved = *alone + PART * moved;
+        *cell += moved;
+    }
+}
+
+/// Finds the moves of cells from column `start` on that have a neighbour on each side.
+#[multiversion(targets("x86_64+avx512vl", "x86_64+avx2"))]
+fn moves_inside([above, own, below]: [&[f32]; 3], start: usize, moves: &mut [f32]) {
+    let count = moves.len();
+    let (left, right) = (&own[start - 1..][..count], &own[start + 1..][..count]);
+    let (own, above, below) = (&own[start..][..count], &above[start..][..count], &below[start..][..count]);
+    for (x, alone) in moves.iter_mut().enumerate() {
+        *alone = PART * ((left[x] - own[x]) + (right[x] - own[x]) + (above[x] - own[x]) + (below[x] - own[x]));
     }
 }
 

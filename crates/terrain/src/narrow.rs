@@ -20,20 +20,34 @@ const STEP_M: f64 = 0.15;
 /// quarries, 1 keeps shrubs on steep slopes.
 const SLOPE_SHARE: f32 = 0.5;
 
-/// Returns the cells of narrow objects; `slope` is that of the ground as far as it is known.
-pub(crate) fn narrow_objects(heights: &Heights<'_>, slope: &Grid<f32>, config: &GroundConfig) -> Grid<bool> {
-    let mut found = slope.map(|_| false);
-    let mut last = heights.whole.clone();
-    let least_m = STEP_M.max(NOISE_DEVIATIONS * heights.noise_m) as f32;
-    let widest_m = NARROW_M.min(0.5 * config.widest_object_m);
-    for radius in 1..=((widest_m / heights.cell_m).floor().max(1.0) as usize) {
-        let low = opened(&last, radius);
-        let half_width_m = (radius as f64 * heights.cell_m) as f32;
-        for (at, found) in found.data_mut().iter_mut().enumerate() {
-            let allowed = config.slope as f32 + SLOPE_SHARE * slope.data()[at];
-            *found |= last.data()[at] - low.data()[at] > least_m + allowed * half_width_m;
+/// How fast what is narrow vanishes, on the heights of a search.
+pub(crate) struct Vanishing {
+    /// Largest slope that a window has cut off at each cell: the height that it took, but for the
+    /// least, by its half-width.
+    slopes: Grid<f32>,
+}
+
+impl Vanishing {
+    pub(crate) fn of(heights: &Heights<'_>, config: &GroundConfig) -> Self {
+        let mut slopes = heights.whole.map(|_| f32::NEG_INFINITY);
+        let mut last = heights.whole.clone();
+        let least_m = STEP_M.max(NOISE_DEVIATIONS * heights.noise_m) as f32;
+        let widest_m = NARROW_M.min(0.5 * config.widest_object_m);
+        for radius in 1..=((widest_m / heights.cell_m).floor().max(1.0) as usize) {
+            let low = opened(&last, radius);
+            let half_width_m = (radius as f64 * heights.cell_m) as f32;
+            let taken_m = last.data().iter().zip(low.data()).map(|(last, low)| last - low);
+            for (slope, taken_m) in slopes.data_mut().iter_mut().zip(taken_m) {
+                *slope = slope.max((taken_m - least_m) / half_width_m);
+            }
+            last = low;
         }
-        last = low;
+        Self { slopes }
     }
-    found
+
+    /// Returns the cells of narrow objects; `slope` is that of the ground as far as it is known.
+    pub(crate) fn objects(&self, slope: &Grid<f32>, config: &GroundConfig) -> Grid<bool> {
+        let allowed = config.slope as f32;
+        self.slopes.zip_map(slope, |cut_off, slope| *cut_off > allowed + SLOPE_SHARE * slope)
+    }
 }

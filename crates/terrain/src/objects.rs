@@ -8,7 +8,7 @@ use crate::coarse::difference;
 use crate::config::GroundConfig;
 use crate::heights::Heights;
 use crate::membrane::filled;
-use crate::narrow::{NARROW_M, narrow_objects};
+use crate::narrow::{NARROW_M, Vanishing};
 use crate::regions::{Regions, quantile};
 
 /// Growth of the half-width from one window to the next.
@@ -35,13 +35,14 @@ pub(crate) const STOREY_M: f32 = 3.0;
 /// [`Cancelled`].
 pub(crate) fn objects(
     heights: &Heights<'_>,
+    vanishing: &Vanishing,
     (trend, slope): (&Grid<f32>, &Grid<f32>),
     config: &GroundConfig,
     progress: &dyn Progress,
 ) -> Result<Grid<bool>, Cancelled> {
     let cell_m = heights.cell_m;
     let (surface, whole) = (&difference(heights.clear, trend), &difference(heights.whole, trend));
-    let mut found = narrow_objects(heights, slope, config);
+    let mut found = vanishing.objects(slope, config);
     let mut doubtful = found.map(|_| false);
     for radius in radii(config.widest_object_m / cell_m) {
         progress.check_cancelled()?;

@@ -9,11 +9,12 @@
 
 use std::ops::Range;
 
+use multiversion::multiversion;
 use raster::Grid;
 
 use crate::coarse::{difference, weighted_blocks, widened};
 use crate::membrane::{completed, filled, halved};
-use crate::runs::{Run, runs};
+use crate::runs::{LANES, Run, runs};
 use crate::trend::fitted;
 
 /// Sweeps over the cells of each level. The coarser level has done the rest.
@@ -112,8 +113,8 @@ struct Level {
     /// Relaxation over the second derivative of the energy of cells inside the raster.
     gains: Grid<f32>,
     tension: f32,
-    /// Memory for what does not depend on the cells to the left.
-    ahead: Vec<f32>,
+    /// Memory for what each cell of a run would move by if those to its left stayed.
+    moves: Vec<f32>,
 }
 
 impl Level {
@@ -121,7 +122,7 @@ impl Level {
         let tension = (cell_m / TENSION_M).powi(2) as f32;
         let heights = known.map(|h| if h.is_nan() { 0.0 } else { *h });
         let gains = weights.map(|weight| RELAXATION / (20.0 + 4.0 * tension + weight));
-        Self { weights, heights, gains, tension, ahead: Vec::with_capacity(known.width()) }
+        Self { weights, heights, gains, tension, moves: Vec::with_capacity(known.width()) }
     }
 
     /// Moves the cells of the runs from where they are to the heights with the least energy.
@@ -145,33 +146,20 @@ impl Level {
         (start.max(end)..columns.end).for_each(|column| self.relax_at_border(out, (column, *row)));
     }
 
-    /// Moves cells whose bending lies within the raster. Its derivative by the height of a cell has
-    /// the weights 20 for the cell, −8 beside it, 2 across corners and 1 two cells away. Vector
-    /// instructions make the sum over all 12 neighbours but the two to the left.
+    /// Moves cells whose bending lies within the raster.
     fn relax_inside(&mut self, out: &mut Grid<f32>, row: usize, columns: Range<usize>) {
         let near_weight = 8.0 + self.tension;
-        let count = columns.len();
-        let line = |row: usize, right: usize| &out.row(row)[columns.start - REACH + right..][..count];
-        let (own, right, right_2) = (line(row, 2), line(row, 3), line(row, 4));
-        let [up_2, up_left, up, up_right] = [line(row - 2, 2), line(row - 1, 1), line(row - 1, 2), line(row - 1, 3)];
-        let [down_2, down_left, down, down_right] =
-            [line(row + 2, 2), line(row + 1, 1), line(row + 1, 2), line(row + 1, 3)];
-        let terms = [&self.gains, &self.weights, &self.heights];
-        let [gains, weights, heights] = terms.map(|of| &of.row(row)[columns.clone()]);
-        self.ahead.clear();
-        self.ahead.extend((0..count).map(|x| {
-            // Differences are small and hardly rounded, however high the ground lies.
-            let from = |line: &[f32]| line[x] - own[x];
-            let near = from(right) + from(up) + from(down);
-            let diagonal = from(up_left) + from(up_right) + from(down_left) + from(down_right);
-            let far = from(right_2) + from(up_2) + from(down_2);
-            gains[x] * (near_weight * near - 2.0 * diagonal - far + weights[x] * (heights[x] - own[x]))
-        }));
-        let (mut left_2, mut left) = (line(row, 0)[0], line(row, 1)[0]);
-        for ((cell, ahead), gain) in out.row_mut(row)[columns].iter_mut().zip(&self.ahead).zip(gains) {
-            let own = *cell;
-            *cell = own + ahead - gain * (left_2 - own) + gain * near_weight * (left - own);
-            (left_2, left) = (left, *cell);
+        let lines: [&[f32]; 2 * REACH + 1] = std::array::from_fn(|i| &out.row(row + i - REACH)[..]);
+        let terms = [&self.gains, &self.weights, &self.heights].map(|of| &of.row(row)[columns.start..]);
+        let gains = terms[0];
+        let count = columns.len().next_multiple_of(LANES).min(out.width() - REACH - columns.start);
+        self.moves.resize(count, 0.0);
+        moves_inside(lines, columns.start, near_weight, terms, &mut self.moves);
+        let (mut moved_2, mut moved) = (0.0, 0.0);
+        for ((cell, alone), gain) in out.row_mut(row)[columns].iter_mut().zip(&self.moves).zip(gains) {
+            let by = (alone - gain * moved_2) + gain * near_weight * moved;
+            *cell += by;
+            (moved_2, moved) = (moved, by);
         }
     }
 
@@ -183,6 +171,34 @@ impl Level {
         let slope = bend.0 + self.tension * pull.0 + weight * (out[place] - self.heights[place]);
         let diagonal = bend.1 + self.tension * pull.1 + weight;
         out[place] -= RELAXATION * slope / diagonal;
+    }
+}
+
+/// Finds what cells from column `start` on would move by if none around them moved. The derivative
+/// of the bending by the height of a cell has the weights 20 for the cell, −8 beside it, 2 across
+/// corners and 1 two cells away.
+#[multiversion(targets("x86_64+avx512vl", "x86_64+avx2"))]
+fn moves_inside<'a>(
+    [up_2, up, own, down, down_2]: [&'a [f32]; 5],
+    start: usize,
+    near_weight: f32,
+    [gains, weights, heights]: [&[f32]; 3],
+    moves: &mut [f32],
+) {
+    let count = moves.len();
+    // `right` counts from two columns to the left.
+    let part = |line: &'a [f32], right: usize| &line[start - REACH + right..][..count];
+    let (left_2, left, here, right, right_2) = (part(own, 0), part(own, 1), part(own, 2), part(own, 3), part(own, 4));
+    let (up_2, up_left, up, up_right) = (part(up_2, 2), part(up, 1), part(up, 2), part(up, 3));
+    let (down_2, down_left, down, down_right) = (part(down_2, 2), part(down, 1), part(down, 2), part(down, 3));
+    let (gains, weights, heights) = (&gains[..count], &weights[..count], &heights[..count]);
+    for (x, alone) in moves.iter_mut().enumerate() {
+        // Differences are small and hardly rounded, however high the ground lies.
+        let own = here[x];
+        let near = (left[x] - own) + (right[x] - own) + (up[x] - own) + (down[x] - own);
+        let diagonal = (up_left[x] - own) + (up_right[x] - own) + (down_left[x] - own) + (down_right[x] - own);
+        let far = (left_2[x] - own) + (right_2[x] - own) + (up_2[x] - own) + (down_2[x] - own);
+        *alone = gains[x] * (near_weight * near - 2.0 * diagonal - far + weights[x] * (heights[x] - own));
     }
 }
 

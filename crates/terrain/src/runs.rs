@@ -4,6 +4,10 @@ use std::ops::Range;
 
 use raster::Grid;
 
+/// Cells that vector instructions process together. Where a run ends between, it is cheaper to go
+/// on to a multiple of them, and to leave the rest unused, than cell by cell.
+pub(crate) const LANES: usize = 16;
+
 /// Cells of a row without a gap.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Run {

@@ -8,7 +8,7 @@
 
 use raster::Grid;
 
-use crate::coarse::{at_cell, weighted_blocks};
+use crate::coarse::{spread, weighted_blocks};
 use crate::config::NOISE_DEVIATIONS;
 use crate::error::TerrainError;
 use crate::ground::{BareGround, GROUND, NOISE_MIN_M, work_side};
@@ -54,19 +54,18 @@ pub fn without_noise(ground: BareGround, sigma_m: &Grid<f32>, cell_m: f64) -> Re
     let side = work_side(cell_m);
     // The standard errors count as if those of neighbours were independent.
     let (means, weights) = weighted_blocks(&heights, side, |at| ((CURVATURE / cell_m) as f32 / sigma_of(at)).powi(2));
-    let plate = smooth_plate(&means, &weights, cell_m * side as f64);
-    let smooth = |at: usize| at_cell(&plate, side, at % expected.0, at / expected.0);
+    let smooth = spread(&smooth_plate(&means, &weights, cell_m * side as f64), side, expected);
     let mut stands_out = heights.map(|_| false);
     for (at, stands_out) in stands_out.data_mut().iter_mut().enumerate() {
         let limit_m = NOISE_DEVIATIONS as f32 * sigma_of(at);
-        *stands_out = states.data()[at] == GROUND && (heights.data()[at] - smooth(at)).abs() > limit_m;
+        *stands_out = states.data()[at] == GROUND && (heights.data()[at] - smooth.data()[at]).abs() > limit_m;
     }
     let regions = Regions::of(&stands_out);
     let least = LEAST_STEP_M2 / (cell_m * cell_m);
     let is_step = regions.mask(|region| regions.cells(region).len() as f64 >= least);
     for (at, height) in heights.data_mut().iter_mut().enumerate().filter(|(_, height)| !height.is_nan()) {
         if !is_step.data()[at] {
-            *height = smooth(at);
+            *height = smooth.data()[at];
         }
     }
     Ok(BareGround { heights, states })

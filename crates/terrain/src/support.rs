@@ -12,7 +12,7 @@
 
 use raster::{Grid, gaussian};
 
-use crate::coarse::{at_cell, difference, weighted_blocks};
+use crate::coarse::{difference, spread, weighted_blocks};
 use crate::ground::{BareGround, UNKNOWN, shown_or_below};
 use crate::membrane::filled;
 use crate::trend::fitted;
@@ -88,14 +88,15 @@ pub fn supported_ground(surface: &Grid<f32>, ground: &Grid<f32>, otherwise: &Gri
     let found = nodes.searched(&even, &nodes.levels(&even), DOUBT);
     let near = Levels { low_m: -(LEVELS_NEAR as f64) * nodes.level_m, count: 2 * LEVELS_NEAR + 1 };
     let found = nodes.searched(&found, &near, DOUBT_NEAR);
-    let [old, new] = [nodes.support(|at| ground.data()[at]), nodes.support(|at| nodes.at(&found, at))];
+    let found_at_cells = nodes.at_cells(&found);
+    let [old, new] = [ground, &found_at_cells].map(|ground| nodes.support(ground));
     let gain = new.zip_map(&old, |new, old| new - old);
     let lower = given.zip_map(&found, |given_m, found_m| given_m - found_m);
     let is_better = gain.zip_map(&lower, |gain, lower_m| if *gain > GAIN_MIN && *lower_m > 0.0 { 1.0 } else { 0.0 });
-    let share = gaussian(&is_better, 1.0);
+    let share = nodes.at_cells(&gaussian(&is_better, 1.0));
     let mut out = otherwise.clone();
     for (at, ground_m) in out.data_mut().iter_mut().enumerate() {
-        *ground_m += nodes.at(&share, at).clamp(0.0, 1.0) * (nodes.at(&found, at) - *ground_m);
+        *ground_m += share.data()[at].clamp(0.0, 1.0) * (found_at_cells.data()[at] - *ground_m);
     }
     out
 }
@@ -140,24 +141,24 @@ impl<'a> Nodes<'a> {
         Self { surface, side, side_m: cell_m * side as f64, level_m: LEVEL_M.max(cell_m), size }
     }
 
-    /// Interpolates a raster of nodes at a cell of the surface.
-    fn at(&self, coarse: &Grid<f32>, cell: usize) -> f32 {
-        let width = self.surface.width();
-        at_cell(coarse, self.side, cell % width, cell / width)
+    /// Interpolates a raster of nodes at the cells of the surface.
+    fn at_cells(&self, coarse: &Grid<f32>) -> Grid<f32> {
+        spread(coarse, self.side, (self.surface.width(), self.surface.height()))
     }
 
-    /// Returns the known cells with their nodes and heights above a guess.
-    fn known(&self, guess: impl Fn(usize) -> f32) -> impl Iterator<Item = (usize, f32)> {
+    /// Returns the known cells with their nodes and heights above a ground at the cells.
+    fn known(&self, ground: &Grid<f32>) -> impl Iterator<Item = (usize, f32)> {
         let width = self.surface.width();
-        let cells = self.surface.data().iter().enumerate().map(move |(cell, height_m)| {
-            (cell / width / self.side * self.size.0 + cell % width / self.side, height_m - guess(cell))
-        });
+        let cells =
+            self.surface.data().iter().zip(ground.data()).enumerate().map(move |(cell, (height_m, ground_m))| {
+                (cell / width / self.side * self.size.0 + cell % width / self.side, height_m - ground_m)
+            });
         cells.filter(|(_, above_m)| !above_m.is_nan())
     }
 
     /// Returns levels from the deepest heights up to a hilltop above a guess.
     fn levels(&self, guess: &Grid<f32>) -> Levels {
-        let mut above: Vec<f32> = self.known(|cell| self.at(guess, cell)).map(|(_, above_m)| above_m).collect();
+        let mut above: Vec<f32> = self.known(&self.at_cells(guess)).map(|(_, above_m)| above_m).collect();
         let rank = above.len() / DEEPER;
         let deepest = numeric::order_statistic(&mut above, rank).unwrap_or(0.0);
         let low_m = f64::from(deepest).clamp(-DEPTH_MAX_M, 0.0) - self.level_m;
@@ -180,7 +181,7 @@ impl<'a> Nodes<'a> {
         // The first layer is for what lies below all levels, the last one for what lies above.
         let mut layers = vec![Grid::filled(self.size.0, self.size.1, 0.0); levels.count + 2];
         let (low_m, level_m) = (levels.low_m as f32, self.level_m as f32);
-        for (node, above_m) in self.known(|cell| self.at(guess, cell)) {
+        for (node, above_m) in self.known(&self.at_cells(guess)) {
             let layer = ((above_m - low_m) / level_m + 1.5).floor().clamp(0.0, (levels.count + 1) as f32);
             layers[layer as usize].data_mut()[node] += 1.0;
         }
@@ -202,7 +203,7 @@ impl<'a> Nodes<'a> {
 
     /// Returns how well the heights around each node support a ground, 0 to 1; 0 where hardly any
     /// height lies at it.
-    fn support(&self, ground: impl Fn(usize) -> f32) -> Grid<f32> {
+    fn support(&self, ground: &Grid<f32>) -> Grid<f32> {
         let [mut at, mut below, mut all] = [(); 3].map(|()| Grid::filled(self.size.0, self.size.1, 0.0));
         let reach_m = (LEVELS_AT as f64 * self.level_m) as f32;
         for (node, above_m) in self.known(ground) {

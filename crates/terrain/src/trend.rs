@@ -4,7 +4,8 @@
 use raster::Grid;
 use rayon::prelude::*;
 
-use crate::coarse::{at_cell, difference};
+use crate::coarse::{difference, spread};
+use crate::membrane::filled;
 use crate::regions::quantile;
 
 /// Side of the blocks that the planes are fitted to, metres.
@@ -50,13 +51,7 @@ pub(crate) fn trend(surface: &Grid<f32>, cell_m: f64, config: &TrendConfig) -> G
     planes.data_mut().par_iter_mut().enumerate().for_each(|(at, height)| {
         *height = plane_at((&blocks, &shares), (at % width, at / width), radius, config.is_lower);
     });
-    let planes = crate::membrane::filled(&planes);
-    let mut out = surface.clone();
-    let width = out.width();
-    out.data_mut().par_iter_mut().enumerate().for_each(|(at, height)| {
-        *height = at_cell(&planes, side, at % width, at / width);
-    });
-    out
+    spread(&filled(&planes), side, (surface.width(), surface.height()))
 }
 
 /// Returns the trend of a ground in which objects are left that may fill the surroundings of a
@@ -75,10 +70,7 @@ pub(crate) fn robust_trend(ground: &Grid<f32>, cell_m: f64) -> Grid<f32> {
             let points = points_around((&blocks, &shares), (at % width, at / width), radius);
             *step = robust_step(&points, radius as f64, ROBUST_HALF_WEIGHT * half_width_m);
         });
-        let width = out.width();
-        out.data_mut().par_iter_mut().enumerate().for_each(|(at, height)| {
-            *height += at_cell(&steps, side, at % width, at / width);
-        });
+        out = out.zip_map(&spread(&steps, side, (out.width(), out.height())), |height, step| height + step);
     }
     out
 }
