@@ -118,7 +118,7 @@ fn images(folder: &Path, side: usize) -> anyhow::Result<Vec<PathBuf>> {
             let view = (date * SLANTS.len() + number) as u64;
             let slant = [slant[0] + across, slant[1]];
             let look = Look { slant, gsd_m: GSD_M, passing: (PASSING, 100 + date as u64), noise: view };
-            let tile = mosaic::tile(folder, &format!("tile_{view}.tif"), &look)?;
+            let tile = mosaic::tile(folder, &format!("tile_{view}.tif"), &look, [side_px; 2])?;
             for strip in 0..STRIPS {
                 let step = side_px / STRIPS;
                 let first = [(strip * step).saturating_sub(SHARED_PX / 2), 0];

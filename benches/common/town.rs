@@ -125,12 +125,12 @@ fn uniform(key: [u64; 4]) -> f64 {
     unit_interval(key.into_iter().fold(0, |state, part| hash64(state ^ part)))
 }
 
-/// Renders the tile of a view, with noise of four digital numbers.
-pub(crate) fn tile(look: &Look) -> Grid<u16> {
-    let period = look.period();
+/// Renders the first columns and lines of a view, with noise of four digital numbers. What is as
+/// large as a period repeats itself.
+pub(crate) fn tile(look: &Look, [columns, lines]: [usize; 2]) -> Grid<u16> {
     let ([a, b], gsd_m, (share, seed)) = (look.slant, look.gsd_m, look.passing);
-    let mut tile = Grid::filled(period, period, 0);
-    tile.data_mut().par_chunks_mut(period).enumerate().for_each(|(line, row)| {
+    let mut tile = Grid::filled(columns, lines, 0);
+    tile.data_mut().par_chunks_mut(columns).enumerate().for_each(|(line, row)| {
         for (sample, pixel) in row.iter_mut().enumerate() {
             let at = |z: f64| [gsd_m * sample as f64 - a * z, b * z - gsd_m * line as f64, z];
             let place = at(hit(at));

@@ -102,7 +102,7 @@ fn arguments() -> anyhow::Result<Arguments> {
 fn images(folder: &Path, side: usize) -> anyhow::Result<Vec<PathBuf>> {
     let image = |(view, slant): (u64, [f64; 2])| {
         let look = Look { slant, gsd_m: GSD_M, passing: (0.0, 0), noise: view };
-        let tile = mosaic::tile(folder, &format!("tile_{view}.tif"), &look)?;
+        let tile = mosaic::tile(folder, &format!("tile_{view}.tif"), &look, [side; 2])?;
         mosaic::image(folder, &format!("view_{view}_{side}"), &tile, &look, &Frame::square(side))
     };
     (0..).zip(SLANTS).map(image).collect()

@@ -78,7 +78,7 @@ fn images(folder: &Path) -> Vec<PathBuf> {
             let view = 10 * date + number;
             let slant = [slant[0] + across, slant[1]];
             let look = Look { slant, gsd_m: 1.0, passing: (0.1, 100 + date), noise: view };
-            let tile = mosaic::tile(folder, &format!("tile_{view}.tif"), &look).unwrap();
+            let tile = mosaic::tile(folder, &format!("tile_{view}.tif"), &look, SIZE).unwrap();
             for (first, width) in STRIPS {
                 let mut within = |most: f64| [0; 2].map(|_| random.uniform_in(-most, most));
                 let (shift_px, drift_px) = (within(4.0), within(1.5));

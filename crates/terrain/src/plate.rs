@@ -149,7 +149,7 @@ impl Level {
     /// Moves cells whose bending lies within the raster.
     fn relax_inside(&mut self, out: &mut Grid<f32>, row: usize, columns: Range<usize>) {
         let near_weight = 8.0 + self.tension;
-        let lines: [&[f32]; 2 * REACH + 1] = std::array::from_fn(|i| &out.row(row + i - REACH)[..]);
+        let lines: [&[f32]; 2 * REACH + 1] = std::array::from_fn(|i| out.row(row + i - REACH));
         let terms = [&self.gains, &self.weights, &self.heights].map(|of| &of.row(row)[columns.start..]);
         let gains = terms[0];
         let count = columns.len().next_multiple_of(LANES).min(out.width() - REACH - columns.start);

@@ -10,6 +10,7 @@
 use camera::ImagePoint;
 use raster::{Grid, Window};
 use rayon::prelude::*;
+use sweep::pointing::correlations_at_shifts;
 
 use super::error::RegisterError;
 use crate::ortho::{OrthoImage, window_of};
@@ -74,30 +75,11 @@ impl<'a> Voter<'a> {
         if known.len() < CELLS_MIN {
             return None;
         }
-        let (side, width) = (2 * reach + 1, self.pixels.width());
-        let at = |k: usize| correlation(&known, self.pixels.data(), (k / side) * width + k % side, reach * (width + 1));
-        let scores: Vec<Option<f64>> = (0..side * side).map(at).collect();
+        let scores = correlations_at_shifts(&known, &self.pixels, reach);
         let count = scores.iter().flatten().count();
         let mean = scores.iter().flatten().sum::<f64>() / count as f64;
         (count > 0).then(|| scores.iter().map(|score| score.map_or(0.0, |score| score - mean)).collect())
     }
-}
-
-/// Returns the correlation of grey values with those of pixels that are `forward` and `back` from
-/// where each is expected; `None` where fewer than half of them are seen, or one side is flat.
-fn correlation(known: &[(f64, usize)], pixels: &[f32], forward: usize, back: usize) -> Option<f64> {
-    let (mut count, mut sums) = (0usize, [0.0f64; 5]);
-    for (own, pixel) in known {
-        let seen = f64::from(pixels[pixel + forward - back]);
-        if seen.is_finite() {
-            count += 1;
-            let terms = [*own, own * own, seen, seen * seen, own * seen];
-            (0..5).for_each(|k| sums[k] += terms[k]);
-        }
-    }
-    let ([f, ff, g, gg, fg], n) = (sums, count as f64);
-    let (vf, vg) = (ff - f * f / n, gg - g * g / n);
-    (2 * count >= known.len() && vf > 0.0 && vg > 0.0).then(|| (fg - f * g / n) / (vf * vg).sqrt())
 }
 
 /// Returns the shifts, columns and rows of whole pixels within `reach`, at which the image shows

@@ -21,6 +21,7 @@ mod off_trajectory;
 mod pair;
 mod patch;
 mod reduce;
+mod shifts;
 mod ties;
 mod tracks;
 
@@ -33,5 +34,6 @@ pub use intersect::{Track, ground_of};
 pub use model::ModelOrder;
 pub use off_trajectory::{OffTrajectory, off_trajectory};
 pub use pair::{Tie, TieConfig};
+pub use shifts::correlations_at_shifts;
 pub use ties::match_pair;
 pub use tracks::{PlacedTie, join_ties};
