@@ -16,7 +16,7 @@ pub(crate) struct Tile {
     size: [usize; 2],
 }
 
-/// Renders the first columns and lines of a view that images of it show, a period at most.
+/// Renders the first columns and lines of a view: as many as its images show, at most a period.
 pub(crate) fn tile(folder: &Path, name: &str, look: &Look, shown: [usize; 2]) -> anyhow::Result<Tile> {
     let size = shown.map(|side| side.min(look.period()));
     let rpc = town::rpc(look, &Frame::square(look.period()));

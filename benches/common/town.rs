@@ -125,8 +125,8 @@ fn uniform(key: [u64; 4]) -> f64 {
     unit_interval(key.into_iter().fold(0, |state, part| hash64(state ^ part)))
 }
 
-/// Renders the first columns and lines of a view, with noise of four digital numbers. What is as
-/// large as a period repeats itself.
+/// Renders the first columns and lines of a view, with noise of four digital numbers. A tile of a
+/// whole period can be laid beside itself without a seam.
 pub(crate) fn tile(look: &Look, [columns, lines]: [usize; 2]) -> Grid<u16> {
     let ([a, b], gsd_m, (share, seed)) = (look.slant, look.gsd_m, look.passing);
     let mut tile = Grid::filled(columns, lines, 0);

@@ -30,7 +30,8 @@ pub(crate) fn blocks(fine: &Grid<f32>, side: usize) -> Grid<f32> {
     coarse
 }
 
-/// Interpolates a raster of blocks at all cells of the raster of `size` that it was made of.
+/// Interpolates a raster of blocks of `side × side` cells at all cells of the raster of this width
+/// and height that it was made of.
 pub(crate) fn spread(coarse: &Grid<f32>, side: usize, (width, height): (usize, usize)) -> Grid<f32> {
     let columns: Vec<Place> = (0..width).map(|column| Place::of(column, side, coarse.width())).collect();
     let mut out = Grid::filled(width, height, f32::NAN);
@@ -59,6 +60,7 @@ impl Place {
     }
 }
 
+/// Interpolates between the centres of four blocks.
 fn between(coarse: &Grid<f32>, column: Place, row: Place) -> f32 {
     let along = |line: &[f32]| line[column.low] + column.part * (line[column.next] - line[column.low]);
     let (low, next) = (along(coarse.row(row.low)), along(coarse.row(row.next)));

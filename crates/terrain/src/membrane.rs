@@ -32,9 +32,9 @@ pub(crate) fn filled(known: &Grid<f32>) -> Grid<f32> {
 /// Moves the unknown cells of a run, from left to right, towards the mean of their neighbours. A
 /// neighbour beyond the border has the height of the cell itself.
 ///
-/// `moves` is memory for what each cell would move by if the one to its left stayed, which vector
-/// instructions find for the whole run. Differences are small and hardly rounded, however high the
-/// ground lies.
+/// First comes what each cell would move by if no other moved, with vector instructions for the
+/// whole run. Each cell then moves by that and by [`PART`] of the move of its left neighbour. Moves
+/// are small and hardly rounded, however high the ground lies. `moves` is memory for them.
 fn relax(out: &mut Grid<f32>, Run { row, columns }: &Run, moves: &mut Vec<f32>) {
     let last = out.width() - 1;
     let [above, own, below] = [row.saturating_sub(1), *row, (row + 1).min(out.height() - 1)].map(|row| out.row(row));

@@ -20,10 +20,11 @@ const STEP_M: f64 = 0.15;
 /// quarries, 1 keeps shrubs on steep slopes.
 const SLOPE_SHARE: f32 = 0.5;
 
-/// How fast what is narrow vanishes, on the heights of a search.
+/// How fast each cell vanishes under the growing windows. It depends on the heights alone, so all
+/// trends of a search use the same.
 pub(crate) struct Vanishing {
-    /// Largest slope that a window has cut off at each cell: the height that it took, but for the
-    /// least, by its half-width.
+    /// Largest slope that a window has cut off at each cell: the height that the window took, less
+    /// the height that any step may take, divided by its half-width.
     slopes: Grid<f32>,
 }
 

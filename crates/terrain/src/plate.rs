@@ -113,7 +113,7 @@ struct Level {
     /// Relaxation over the second derivative of the energy of cells inside the raster.
     gains: Grid<f32>,
     tension: f32,
-    /// Memory for what each cell of a run would move by if those to its left stayed.
+    /// Memory for what each cell of a run would move by if no other moved.
     moves: Vec<f32>,
 }
 
@@ -146,7 +146,8 @@ impl Level {
         (start.max(end)..columns.end).for_each(|column| self.relax_at_border(out, (column, *row)));
     }
 
-    /// Moves cells whose bending lies within the raster.
+    /// Moves cells whose bending lies within the raster, each by what it would move by if no other
+    /// moved, and by what the moves of the two cells to its left add.
     fn relax_inside(&mut self, out: &mut Grid<f32>, row: usize, columns: Range<usize>) {
         let near_weight = 8.0 + self.tension;
         let lines: [&[f32]; 2 * REACH + 1] = std::array::from_fn(|i| out.row(row + i - REACH));
@@ -186,7 +187,7 @@ fn moves_inside<'a>(
     moves: &mut [f32],
 ) {
     let count = moves.len();
-    // `right` counts from two columns to the left.
+    // A part begins `right` columns after the one two columns to the left.
     let part = |line: &'a [f32], right: usize| &line[start - REACH + right..][..count];
     let (left_2, left, here, right, right_2) = (part(own, 0), part(own, 1), part(own, 2), part(own, 3), part(own, 4));
     let (up_2, up_left, up, up_right) = (part(up_2, 2), part(up, 1), part(up, 2), part(up, 3));

@@ -4,8 +4,9 @@ use std::ops::Range;
 
 use raster::Grid;
 
-/// Cells that vector instructions process together. Where a run ends between, it is cheaper to go
-/// on to a multiple of them, and to leave the rest unused, than cell by cell.
+/// Cells that vector instructions process together. The last cells of a run are computed with those
+/// behind it up to a multiple of this number, whose results are not used: that takes less time than
+/// one cell after the other.
 pub(crate) const LANES: usize = 16;
 
 /// Cells of a row without a gap.

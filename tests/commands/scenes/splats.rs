@@ -201,7 +201,7 @@ fn pointing_comes_from_the_run_that_made_the_surface() {
     };
     let (without, with) = (psnr(&["--corrections", "none"]), psnr(&[]));
     assert!(with > without + 0.5, "{with:.2} dB with the corrections of the run, {without:.2} dB without");
-    // Looking through the last splats again takes the pointing that they were made with.
+    // The splats of the last run were made with the corrections. Looking through them takes those.
     let seen = folder.path().join("seen");
     let rendered = |options: &[&str]| {
         let mut command = skysweep();

@@ -41,7 +41,7 @@ impl SurfaceLayers {
         let is_smoothed = self.files.iter().any(|name| name == SIGMA);
         let smoothed = if is_smoothed { "; the ground is smoothed as far as its heights are uncertain" } else { "" };
         format!(
-            "{}: {filled} filled cells are no evidence of the ground, and {weak} weak ones are it only where many \
+            "{}: {filled} filled cells are no evidence of the ground, and {weak} weak ones count only where many \
              agree{smoothed}",
             self.files.join(", ")
         )

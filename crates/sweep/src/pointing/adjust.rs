@@ -97,7 +97,8 @@ const NORMAL_MEDIAN: f64 = 0.6745;
 /// Least difference of the Bayesian information criteria for which drifts or affine maps take the
 /// place of a lower order: "strong" evidence (Kass and Raftery 1995,
 /// <https://doi.org/10.1080/01621459.1995.10476572>). Every RPC is off by a shift, few by more, and
-/// a drift that ties only seem to have bends the surface. Those of JAX_068 differ by nine and more.
+/// a drift that ties only seem to have bends the surface. Real drifts, those of JAX_068, differ by
+/// nine and more.
 const STRONG: f64 = 6.0;
 /// Ground points closer to each other than this in their first view are one for the choice of the
 /// order, pixels: the side of the patches that are matched, which then share their pixels.

@@ -1,4 +1,5 @@
-//! Correlation of a few grey values with an image at all shifts of whole pixels.
+//! Correlation of grey values, each at a pixel of its own, with an image at all shifts of whole
+//! pixels. Patches of neighbouring pixels are those of `masked_patch`.
 
 use multiversion::multiversion;
 use raster::Grid;
@@ -23,7 +24,8 @@ pub fn correlations_at_shifts(known: &[(f64, usize)], image: &Grid<f32>, reach: 
     let side = 2 * reach + 1;
     let mut out = Vec::with_capacity(side * side);
     for row in 0..side {
-        // Of the values known, of those of the image, and of their squares and products.
+        // Sums over the pixels that have a value: their number, the known values and their squares,
+        // those of the image and their squares, and the products of the two.
         let mut sums: [Vec<f64>; 6] = std::array::from_fn(|_| vec![0.0; side]);
         for (own, pixel) in known {
             let first = pixel + row * image.width() - reach * (image.width() + 1);
